@@ -1,0 +1,119 @@
+#include "base/rng.h"
+#include "math/rigid3.h"
+#include "math/sampling.h"
+#include "math/statistics.h"
+
+#include <gtest/gtest.h>
+
+namespace vitrine {
+namespace {
+
+TEST(Rigid3, ProductAndInverse) {
+    const Rigid3 b_from_a{Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix(),
+                          Vec3(1, 2, 3)};
+    const Rigid3 c_from_b{Eigen::AngleAxisd(-1.1, Vec3(0, 1, 1).normalized()).toRotationMatrix(),
+                          Vec3(-1, 0, 2)};
+    const Vec3 point_in_a(0.2, -0.4, 0.9);
+    EXPECT_LT(((c_from_b * b_from_a) * point_in_a - c_from_b * (b_from_a * point_in_a)).norm(),
+              1e-14);
+    EXPECT_LT((b_from_a.inverse() * (b_from_a * point_in_a) - point_in_a).norm(), 1e-14);
+    EXPECT_TRUE(is_rotation(b_from_a.rotation));
+}
+
+TEST(Rigid3, LookAtPutsTheTargetOnTheAxis) {
+    const Rigid3 world_from_camera = look_at(Vec3(1, -2, 1), Vec3(0, 0, 0.1), Vec3(0, 0, 1));
+    const Vec3 target_in_camera = world_from_camera.inverse() * Vec3(0, 0, 0.1);
+    EXPECT_NEAR(target_in_camera.x(), 0, 1e-12);
+    EXPECT_NEAR(target_in_camera.y(), 0, 1e-12);
+    EXPECT_GT(target_in_camera.z(), 0);
+    EXPECT_LT((world_from_camera.rotation * Vec3(0, 1, 0)).z(), 0);  // image down is world down
+}
+
+TEST(Rigid3, AlignPointsRecoversTheMotion) {
+    const Rigid3 truth{Eigen::AngleAxisd(2.0, Vec3(1, -1, 0.5).normalized()).toRotationMatrix(),
+                       Vec3(0.1, 0.2, -0.3)};
+    Rng rng(1);
+    std::vector<Vec3> a, b;
+    for (int i = 0; i < 10; ++i) {
+        a.emplace_back(rng.next_double(), rng.next_double(), rng.next_double());
+        b.push_back(truth * a.back());
+    }
+    const Rigid3 found = align_points(a, b);
+    EXPECT_LT((found.rotation - truth.rotation).norm(), 1e-12);
+    EXPECT_LT((found.translation - truth.translation).norm(), 1e-12);
+}
+
+TEST(Frame, IsOrthonormalEverywhere) {
+    for (const Vec3& n : fibonacci_sphere(101)) {
+        const Frame frame(n.cast<float>());
+        EXPECT_NEAR(frame.tangent.dot(frame.bitangent), 0, 1e-6);
+        EXPECT_NEAR(frame.tangent.cross(frame.bitangent).dot(frame.normal), 1, 1e-6);
+    }
+}
+
+/// Samples agree with their density: theta x phi histogram, Pearson chi-square.
+template <typename Sample>
+void expect_density(const Sample& sample, double cos_min,
+                    const std::function<double(double)>& fraction_above) {
+    constexpr int kTheta = 11, kPhi = 16, kCount = 200000;
+    std::vector<double> observed(kTheta * kPhi, 0.0), expected(kTheta * kPhi, 0.0);
+    Rng rng(17);
+    for (int i = 0; i < kCount; ++i) {
+        const Vec3f d = sample(Vec2f(rng.next_float(), rng.next_float()));
+        ASSERT_NEAR(d.norm(), 1.0f, 1e-5f);
+        const double t = (1.0 - d.z()) / (1.0 - cos_min) * kTheta;
+        const double p = (std::atan2(d.y(), d.x()) / (2 * kPi) + 0.5) * kPhi;
+        observed[std::clamp(int(t), 0, kTheta - 1) * kPhi + std::clamp(int(p), 0, kPhi - 1)] += 1;
+    }
+    for (int t = 0; t < kTheta; ++t) {
+        const double upper = 1 - (1 - cos_min) * t / kTheta,
+                     lower = 1 - (1 - cos_min) * (t + 1) / kTheta;
+        const double share = fraction_above(lower) - fraction_above(upper);
+        for (int p = 0; p < kPhi; ++p) expected[t * kPhi + p] = kCount * share / kPhi;
+    }
+    const ChiSquareResult result = chi_square_test(observed, expected);
+    EXPECT_GT(result.p_value, 0.001) << result.description;
+}
+
+TEST(Sampling, DirectionsFollowTheirDensity) {
+    expect_density([](const Vec2f& u) { return sample_cosine_hemisphere(u); }, 0.0,
+                   [](double z) { return 1 - z * z; });
+    expect_density([](const Vec2f& u) { return sample_uniform_sphere(u); }, -1.0,
+                   [](double z) { return 0.5 * (1 - z); });
+    expect_density([](const Vec2f& u) { return sample_uniform_cone(u, 0.9f); }, 0.9,
+                   [](double z) { return (1 - z) / 0.1; });
+}
+
+TEST(Sampling, LowDiscrepancyPointsFillTheSquare) {
+    // 256 points, 16 x 16 cells: Sobol hits each once; R2 and Halton leave few empty.
+    std::vector<int> sobol(256, 0), r2(256, 0), halton_cells(256, 0);
+    for (std::uint32_t i = 0; i < 256; ++i) {
+        const auto cell = [](float x, float y) { return int(x * 16) * 16 + int(y * 16); };
+        ++sobol[cell(scrambled_sobol(i, 0, 9), scrambled_sobol(i, 1, 9))];
+        const Vec2f p = r2_point(i);
+        ++r2[cell(p.x(), p.y())];
+        ++halton_cells[cell(halton(i, 0), halton(i, 1))];
+    }
+    EXPECT_EQ(std::count(sobol.begin(), sobol.end(), 1), 256);
+    EXPECT_LT(std::count(r2.begin(), r2.end(), 0), 60);
+    EXPECT_LT(std::count(halton_cells.begin(), halton_cells.end(), 0), 70);
+}
+
+TEST(Sampling, DiscreteDistributionMatchesItsWeights) {
+    const std::vector<double> weights = {1, 0, 3, 6};
+    const DiscreteDistribution distribution(weights);
+    std::vector<double> counts(4, 0.0);
+    Rng rng(5);
+    for (int i = 0; i < 100000; ++i) {
+        float u = rng.next_float();
+        counts[distribution.sample(u)] += 1;
+        ASSERT_GE(u, 0.0f);
+        ASSERT_LT(u, 1.0f);
+    }
+    EXPECT_EQ(counts[1], 0);
+    EXPECT_NEAR(counts[3] / 100000, 0.6, 0.01);
+    EXPECT_DOUBLE_EQ(distribution.probability(2), 0.3);
+}
+
+}  // namespace
+}  // namespace vitrine

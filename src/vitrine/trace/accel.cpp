@@ -1,0 +1,194 @@
+#include "trace/accel.h"
+
+#include "base/error.h"
+
+#include <embree3/rtcore.h>
+
+#include <limits>
+
+namespace vitrine {
+
+struct Accel::Impl {
+    RTCDevice device = nullptr;
+    RTCScene scene = nullptr;
+    ~Impl() {
+        if (scene) rtcReleaseScene(scene);
+        if (device) rtcReleaseDevice(device);
+    }
+};
+
+namespace {
+
+void throw_on_error(void*, RTCError code, const char* text) {
+    // Called while a scene is built; Embree is C, but unwinding through it is only done from commit
+    // paths that hold no lock, and the run ends anyway.
+    throw MachineError(fmt::format("ray tracing library failed ({}): {}", static_cast<int>(code),
+                                   text ? text : ""));
+}
+
+RTCRay to_embree(const Ray& ray) {
+    RTCRay r;
+    r.org_x = ray.origin.x();
+    r.org_y = ray.origin.y();
+    r.org_z = ray.origin.z();
+    r.dir_x = ray.direction.x();
+    r.dir_y = ray.direction.y();
+    r.dir_z = ray.direction.z();
+    r.tnear = ray.min_distance;
+    r.tfar = ray.max_distance;
+    r.time = 0.0f;
+    r.mask = ray.mask;
+    r.id = 0;
+    r.flags = 0;
+    return r;
+}
+
+void self_test(RTCDevice device) {
+    // Debian's build honours ray masks; a build that does not, or a broken one, shows here.
+    RTCScene scene = rtcNewScene(device);
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* v = static_cast<float*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, 3));
+    const float corners[9] = {-1, -1, 1, 1, -1, 1, 0, 1, 1};
+    std::copy_n(corners, 9, v);
+    auto* t = static_cast<unsigned*>(
+        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, 1));
+    t[0] = 0;
+    t[1] = 1;
+    t[2] = 2;
+    rtcSetGeometryMask(geometry, 2u);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+    bool is_right = true;
+    for (const std::uint32_t mask : {2u, 4u}) {
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        RTCRayHit hit;
+        hit.ray = to_embree({Vec3f::Zero(), Vec3f(0, 0, 1), 0.0f, 10.0f, mask});
+        hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        rtcIntersect1(scene, &context, &hit);
+        const bool did_hit = hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+        is_right &= did_hit == (mask == 2u) && (!did_hit || std::abs(hit.ray.tfar - 1.0f) < 1e-5f);
+    }
+    rtcReleaseScene(scene);
+    if (!is_right) {
+        throw MachineError("ray tracing self-test failed: install libembree3-3 from Debian 12");
+    }
+}
+
+}  // namespace
+
+Accel::Accel(std::vector<AccelPart> parts) : parts_(std::move(parts)) {
+    auto impl = std::make_shared<Impl>();
+    impl->device = rtcNewDevice(nullptr);
+    if (!impl->device) throw MachineError("the ray tracing library does not start");
+    self_test(impl->device);
+    rtcSetDeviceErrorFunction(impl->device, throw_on_error, nullptr);
+    impl->scene = rtcNewScene(impl->device);
+    rtcSetSceneFlags(impl->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(impl->scene, RTC_BUILD_QUALITY_HIGH);
+    for (const AccelPart& part : parts_) {
+        RTCGeometry geometry = rtcNewGeometry(impl->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        const Mesh& mesh = *part.mesh;
+        auto* vertices = static_cast<float*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                    3 * sizeof(float), mesh.vertices.size()));
+        auto* triangles = static_cast<unsigned*>(
+            rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                    3 * sizeof(unsigned), mesh.triangles.size()));
+        for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+            for (int c = 0; c < 3; ++c)
+                vertices[3 * i + static_cast<std::size_t>(c)] = mesh.vertices[i][c];
+        }
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+            for (int c = 0; c < 3; ++c) {
+                triangles[3 * i + static_cast<std::size_t>(c)] =
+                    static_cast<unsigned>(mesh.triangles[i][c]);
+            }
+        }
+        rtcSetGeometryMask(geometry, part.mask);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(impl->scene, geometry);  // ids count up from 0 in this order
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(impl->scene);
+    impl_ = std::move(impl);
+}
+
+Hit Accel::closest(const Ray& ray) const {
+    Hit result;
+    if (!impl_) return result;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit hit;
+    hit.ray = to_embree(ray);
+    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(impl_->scene, &context, &hit);
+    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return result;
+    result.distance = hit.ray.tfar;
+    result.part = static_cast<int>(hit.hit.geomID);
+    result.triangle = static_cast<int>(hit.hit.primID);
+    result.barycentric = Vec2f(hit.hit.u, hit.hit.v);
+    result.normal = Vec3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
+    return result;
+}
+
+bool Accel::is_occluded(const Ray& ray) const {
+    if (!impl_) return false;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRay r = to_embree(ray);
+    rtcOccluded1(impl_->scene, &context, &r);
+    return r.tfar < 0.0f;
+}
+
+void Accel::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const {
+    occluded.assign(rays.size(), 0);
+    if (!impl_) return;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    std::vector<RTCRay> batch(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) batch[i] = to_embree(rays[i]);
+    rtcOccluded1M(impl_->scene, &context, batch.data(), static_cast<unsigned>(batch.size()),
+                  sizeof(RTCRay));
+    for (std::size_t i = 0; i < rays.size(); ++i) occluded[i] = batch[i].tfar < 0.0f ? 1 : 0;
+}
+
+namespace {
+
+template <typename T>
+T interpolate(const std::vector<T>& values, const Triangle& t, const Vec2f& b) {
+    return values[static_cast<std::size_t>(t[0])] * (1.0f - b.x() - b.y()) +
+           values[static_cast<std::size_t>(t[1])] * b.x() +
+           values[static_cast<std::size_t>(t[2])] * b.y();
+}
+
+const Triangle& triangle_of(const Mesh& mesh, const Hit& hit) {
+    return mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+}
+
+}  // namespace
+
+Vec3f hit_point(const Mesh& mesh, const Hit& hit) {
+    return interpolate(mesh.vertices, triangle_of(mesh, hit), hit.barycentric);
+}
+
+Vec3f shading_normal(const Mesh& mesh, const Hit& hit) {
+    if (mesh.normals.empty()) return hit.normal;
+    const Vec3f n = interpolate(mesh.normals, triangle_of(mesh, hit), hit.barycentric).normalized();
+    if (!n.allFinite()) return hit.normal;
+    return n.dot(hit.normal) < 0.0f ? Vec3f(-n) : n;
+}
+
+Rgb interpolate_colour(const Mesh& mesh, const Hit& hit) {
+    return interpolate(mesh.colours, triangle_of(mesh, hit), hit.barycentric);
+}
+
+Vec2f interpolate_uv(const Mesh& mesh, const Hit& hit) {
+    return interpolate(mesh.uv, triangle_of(mesh, hit), hit.barycentric);
+}
+
+}  // namespace vitrine
