@@ -28,7 +28,7 @@ endif()
 
 function(vitrine_link target scope)
     foreach(item IN LISTS ARGN)
-        if(TARGET vitrine_${item} OR item MATCHES "^[a-z]+$")
+        if(NOT TARGET ${item} AND item MATCHES "^[a-z]+$")
             target_link_libraries(${target} ${scope} vitrine_${item})
         else()
             target_link_libraries(${target} ${scope} ${item})
