@@ -32,8 +32,8 @@ class SceneFile : public testing::Test {
 
 TEST_F(SceneFile, RoundTripKeepsEveryKind) {
     Scene scene;
-    scene.cameras.push_back({"c0", 64, 48, 50, 51, 31.5, 23.5,
-                             look_at(Vec3(1, 1, 1), Vec3::Zero(), Vec3(0, 0, 1)).inverse()});
+    scene.cameras.push_back(
+        {"c0", 64, 48, 50, 51, 31.5, 23.5, Rigid3{Mat3::Identity(), Vec3(-1, -1, -1)}});
     const auto mesh = std::make_shared<Mesh>(make_sphere(0.1, Vec3(0, 0, 0.1), 8));
     scene.parts.push_back(
         {"a", mesh, Diffuse{Rgb(0.1f, 0.2f, 0.3f), nullptr, "", false}, "", false});
