@@ -1,0 +1,10 @@
+// apps/cli/commands.h: the commands of `vitrine`, one function and one file each.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace vitrine::cli {
+
+void add_check_command(CLI::App& root);
+
+}  // namespace vitrine::cli

@@ -1,0 +1,10 @@
+// The table of commands. Each one parses, calls the library and prints; no algorithm lives here.
+#include "command.h"
+#include "commands.h"
+
+int main(int argc, char** argv) {
+    using namespace vitrine::cli;
+    return run_main(argc, argv, [](CLI::App& root) {
+        for (const auto add : {add_check_command}) add(root);
+    });
+}
