@@ -36,6 +36,8 @@ function(vitrine_link target scope)
     endforeach()
 endfunction()
 
+add_custom_target(unit_tests)  # the fast test programs, for the sanitizer build
+
 function(vitrine_test target label)
     cmake_parse_arguments(ARG "" "" "SRCS;LINK" ${ARGN})
     add_executable(${target} ${ARG_SRCS})
@@ -43,6 +45,9 @@ function(vitrine_test target label)
     target_compile_definitions(${target} PRIVATE VITRINE_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
     add_test(NAME ${target} COMMAND ${target})
     set_tests_properties(${target} PROPERTIES LABELS ${label})
+    if(label STREQUAL fast)
+        add_dependencies(unit_tests ${target})
+    endif()
 endfunction()
 
 function(vitrine_library)
