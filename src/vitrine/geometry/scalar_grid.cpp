@@ -13,12 +13,8 @@ namespace {
 
 // Corner c of a cell sits at (c & 1, c >> 1 & 1, c >> 2 & 1). All six tetrahedra share the diagonal
 // 0-7, so that neighbouring cells cut their common face along the same line.
-constexpr std::array<std::array<int, 4>, 6> kTetrahedra = {{{0, 1, 3, 7},
-                                                            {0, 3, 2, 7},
-                                                            {0, 2, 6, 7},
-                                                            {0, 6, 4, 7},
-                                                            {0, 4, 5, 7},
-                                                            {0, 5, 1, 7}}};
+constexpr std::array<std::array<int, 4>, 6> kTetrahedra = {
+    {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}}};
 
 /// Collects the triangles of one tetrahedron after another, with shared vertices.
 class SurfaceBuilder {
@@ -41,11 +37,11 @@ class SurfaceBuilder {
                           corners[static_cast<std::size_t>(b)]);
         };
         if (inside_count == 1) {
-            emit(cut(inside[0], outside[0]), cut(inside[0], outside[1]),
-                 cut(inside[0], outside[2]), corners, inside[0], outside[0]);
+            emit(cut(inside[0], outside[0]), cut(inside[0], outside[1]), cut(inside[0], outside[2]),
+                 corners, inside[0], outside[0]);
         } else if (inside_count == 3) {
-            emit(cut(outside[0], inside[0]), cut(outside[0], inside[1]),
-                 cut(outside[0], inside[2]), corners, inside[0], outside[0]);
+            emit(cut(outside[0], inside[0]), cut(outside[0], inside[1]), cut(outside[0], inside[2]),
+                 corners, inside[0], outside[0]);
         } else if (inside_count == 2) {
             const int a = cut(inside[0], outside[0]), b = cut(inside[0], outside[1]);
             const int c = cut(inside[1], outside[1]), d = cut(inside[1], outside[0]);
@@ -77,7 +73,8 @@ class SurfaceBuilder {
             vertices_.try_emplace({ia, ib}, static_cast<int>(mesh_.vertices.size()));
         if (is_new) {
             // Off the nodes by a little, so that no triangle collapses to a point.
-            const double t = std::clamp(double(value(a)) / (double(value(a)) - value(b)), 0.02, 0.98);
+            const double t =
+                std::clamp(double(value(a)) / (double(value(a)) - value(b)), 0.02, 0.98);
             const Vec3 p = (1 - t) * a.cast<double>() + t * b.cast<double>();
             mesh_.vertices.push_back((grid_.origin + grid_.spacing_m * p).cast<float>());
         }
@@ -86,9 +83,9 @@ class SurfaceBuilder {
 
     void emit(int a, int b, int c, const std::array<Eigen::Vector3i, 4>& corners, int in, int out) {
         const auto at = [&](int v) { return mesh_.vertices[static_cast<std::size_t>(v)]; };
-        const Vec3f outward = (corners[static_cast<std::size_t>(out)] -
-                               corners[static_cast<std::size_t>(in)])
-                                  .cast<float>();
+        const Vec3f outward =
+            (corners[static_cast<std::size_t>(out)] - corners[static_cast<std::size_t>(in)])
+                .cast<float>();
         const bool faces_out = (at(b) - at(a)).cross(at(c) - at(a)).dot(outward) > 0;
         mesh_.triangles.push_back(faces_out ? Triangle(a, b, c) : Triangle(a, c, b));
     }

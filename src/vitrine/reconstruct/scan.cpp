@@ -1,0 +1,102 @@
+#include "reconstruct/scan.h"
+
+#include "base/log.h"
+#include "base/parallel.h"
+#include "math/statistics.h"
+#include "reconstruct/appearance.h"
+#include "reconstruct/fusion.h"
+#include "trace/depth_map.h"
+
+#include <algorithm>
+
+namespace vitrine {
+namespace {
+
+std::vector<ImageF> depth_images(const Capture& capture) {
+    std::vector<ImageF> depth;
+    for (const RgbdFrame& frame : capture.frames) depth.push_back(frame.depth_m);
+    return depth;
+}
+
+/// The plane that most depth pixels lie on, its normal towards the cameras.
+Plane find_support_plane(const Capture& capture, const std::vector<Camera>& cameras,
+                         double max_depth_m) {
+    std::vector<Vec3> points;
+    Vec3 eye = Vec3::Zero();
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const ImageF& depth = capture.frames[i].depth_m;
+        for (int y = 0; y < depth.height(); y += 4) {
+            for (int x = 0; x < depth.width(); x += 4) {
+                const double z = depth(x, y);
+                if (z > 0 && z < max_depth_m) points.push_back(cameras[i].unproject(x, y, z));
+            }
+        }
+        eye += cameras[i].centre_in_world() / double(cameras.size());
+    }
+    if (points.size() < 100) {
+        throw InputError(
+            {capture.name, "depth images with valid readings",
+             fmt::format("{} usable depth pixels", 16 * points.size()),
+             "check depth_scale in capture.json (5000 for TUM, 1000 for millimetres)"});
+    }
+    const double tolerance = 2.5 * depth_noise_m(0.5 * max_depth_m);
+    Plane plane = fit_plane(points, tolerance).plane;
+    if (plane.height(eye) < 0) plane = {-plane.normal, -plane.offset_m};
+    return plane;
+}
+
+double depth_residual(const Capture& capture, const std::vector<ImageF>& model,
+                      std::vector<FramePose>& poses) {
+    std::vector<double> all;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        std::vector<double> own;
+        const ImageF& depth = capture.frames[i].depth_m;
+        for (std::size_t p = 0; p < depth.size(); p += 7) {
+            if (depth[p] > 0 && model[i][p] > 0) own.push_back(depth[p] - model[i][p]);
+        }
+        poses[i].residual_m = own.empty() ? 0.0 : robust_sd(own);
+        all.insert(all.end(), own.begin(), own.end());
+    }
+    return all.empty() ? 0.0 : robust_sd(all);
+}
+
+std::vector<Camera> cameras_of(const Capture& capture) {
+    std::vector<Camera> cameras;
+    for (const RgbdFrame& frame : capture.frames) cameras.push_back(frame.camera);
+    return cameras;
+}
+
+}  // namespace
+
+Scan make_scan(const Capture& capture, const ScanOptions& options, const Progress& progress) {
+    if (capture.frames.empty()) {
+        throw InputError({capture.name, "at least one frame", "none", ""});
+    }
+    Scan scan;
+    scan.cameras = cameras_of(capture);
+    for (const RgbdFrame& frame : capture.frames) scan.poses.push_back({.id = frame.id});
+    progress.update(0.0, "fusing depth");
+    const FusionOptions fusion{options.voxel_m, options.truncation_m, options.max_depth_m};
+    const std::vector<ImageF> depth = depth_images(capture);
+    scan.mesh =
+        without_small_pieces(fuse_depth(depth, scan.cameras, fusion), options.min_component_m2);
+    scan.support_plane = find_support_plane(capture, scan.cameras, options.max_depth_m);
+    scan.mesh.normals = vertex_normals(scan.mesh);
+    progress.update(0.6, "rendering the surface");
+    const Accel accel({{std::make_shared<const Mesh>(scan.mesh)}});
+    std::vector<ImageF> model;
+    for (const Camera& camera : scan.cameras) model.push_back(render_depth(accel, camera));
+    scan.depth_residual_m = depth_residual(capture, model, scan.poses);
+    progress.update(0.8, "colouring the surface");
+    std::vector<ViewOfScene> views;
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        views.push_back({&capture.frames[i], &scan.cameras[i], &model[i], nullptr});
+    }
+    scan.mesh.colours = vertex_colours(scan.mesh, views);
+    log_info("scan: {} vertices, depth residual {:.2f} mm", scan.mesh.vertices.size(),
+             1e3 * scan.depth_residual_m);
+    progress.update(1.0, "scan done");
+    return scan;
+}
+
+}  // namespace vitrine
