@@ -6,6 +6,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
+#include <ImfMatrixAttribute.h>
 #include <ImfMultiPartInputFile.h>
 #include <ImfOutputFile.h>
 #include <ImfPartType.h>
@@ -68,6 +69,10 @@ ExrImage read_exr(const std::filesystem::path& path) {
         for (auto it = file.header().begin(); it != file.header().end(); ++it) {
             if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute())) {
                 image.attributes[it.name()] = text->value();
+            } else if (const auto* matrix =
+                           dynamic_cast<const Imf::M44fAttribute*>(&it.attribute())) {
+                Mat4& m = image.matrices[it.name()];
+                for (int i = 0; i < 16; ++i) m(i % 4, i / 4) = matrix->value()[i / 4][i % 4];
             }
         }
         return image;
@@ -103,6 +108,13 @@ void write_exr(const std::filesystem::path& path, const ExrImage& image,
             Imf::addChromaticities(header, Imf::Chromaticities());  // Rec. 709 primaries, D65
             for (const auto& [name, value] : image.attributes) {
                 header.insert(name, Imf::StringAttribute(value));
+            }
+            for (const auto& [name, value] : image.matrices) {
+                Imath::M44f m;
+                for (int i = 0; i < 16; ++i) {
+                    m[i / 4][i % 4] = static_cast<float>(value(i % 4, i / 4));
+                }
+                header.insert(name, Imf::M44fAttribute(m));
             }
             Imf::FrameBuffer buffer;
             std::vector<std::vector<half>> halves;

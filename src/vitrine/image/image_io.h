@@ -50,6 +50,7 @@ struct ExrImage {
     int height = 0;
     std::map<std::string, ImageF> channels;
     std::map<std::string, std::string> attributes;  ///< string attributes
+    std::map<std::string, Mat4> matrices;           ///< 4x4, for columns (files hold the transpose)
 };
 
 /// @throws InputError for deep, tiled-only-multipart, oversized or damaged files.

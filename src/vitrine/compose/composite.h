@@ -1,0 +1,33 @@
+// compose/composite.h: a photo and a rendered difference, put together and written.
+#pragma once
+
+#include "render/differential.h"
+
+#include <filesystem>
+
+namespace vitrine {
+
+/// Raises the shadow layer where plate + delta would be negative: a model that is too bright must
+/// not take away more light than the camera saw.
+DifferentialImage fitted_to_plate(const ImageRgb& plate, DifferentialImage difference);
+
+/// (1 - coverage) * (plate + delta) + object, linear, of the fitted difference.
+/// @param plate what the camera captured, linear, the size of the difference
+ImageRgb composite(const ImageRgb& plate, const DifferentialImage& difference);
+
+struct CompositeWriteOptions {
+    std::uint64_t seed = 0;  ///< goes into the attributes
+};
+
+/// Composes and writes. Layers of one part: R G B A (the finished picture), object.RGBA, delta.RGB,
+/// shadow, caustics, reflection, refraction, diffuse .RGB, Z, normal.XYZ, albedo.RGB; half except
+/// Z.
+/// @throws MachineError
+void write_composite_exr(const std::filesystem::path& path, const ImageRgb& plate,
+                         const DifferentialImage& difference, const Camera& camera,
+                         const CompositeWriteOptions& options = {});
+/// @param linear_scale radiance shown as full white; the capture's own gives a picture to match
+void write_composite_png(const std::filesystem::path& path, const ImageRgb& picture,
+                         double linear_scale);
+
+}  // namespace vitrine

@@ -1,0 +1,330 @@
+#include "render/caustics.h"
+
+#include "base/parallel.h"
+#include "render/interface.h"
+#include "render/sampler.h"
+
+namespace vitrine {
+namespace {
+
+/// Faint branches of an interface survive with this many times their share of the power.
+constexpr float kFaintBranchBoost = 4.0f;
+/// The share below which a branch is left to chance at all.
+constexpr float kSurePower = 0.25f;
+constexpr float kSoftRadiusFactor = 4.0f;
+constexpr float kWideRadiusFactor = 8.0f;
+constexpr float kMergeShare = 0.3f;  // of the gather radius
+
+struct Target {
+    std::size_t light = 0;
+    int part = 0;
+    Sphere sphere;
+    std::uint64_t count = 0;
+    std::uint64_t key = 0;
+};
+
+float bending_weight(const Material& material) {
+    if (std::holds_alternative<Dielectric>(material)) return 1.0f;
+    if (const auto* mirror = std::get_if<Mirror>(&material)) {
+        return mirror->reflectance.maxCoeff() > 0 ? 1.0f : 0.0f;
+    }
+    // A glossy lobe blurs: half the photons do.
+    if (const auto* ward = std::get_if<Ward>(&material)) {
+        return ward->rho_s.maxCoeff() > 0 ? 0.5f : 0.0f;
+    }
+    return 0.0f;
+}
+
+/// Sphere around the vertices: centre of the box, farthest vertex.
+Sphere sphere_around(const Mesh& mesh) {
+    Sphere sphere;
+    sphere.centre = bounds(mesh).centre().cast<float>();
+    for (const Vec3f& v : mesh.vertices) {
+        sphere.radius = std::max(sphere.radius, (v - sphere.centre).norm());
+    }
+    sphere.radius *= 1.0001f;  // rays along the outline belong to it
+    return sphere;
+}
+
+std::vector<Target> find_targets(const RenderScene& scene, const CausticOptions& options) {
+    std::vector<Target> targets;
+    std::vector<double> weights;
+    double sum = 0;
+    for (std::size_t light = 0; light < scene.lights().count(); ++light) {
+        for (std::size_t p = 0; p < scene.scene().parts.size(); ++p) {
+            const Part& part = scene.scene().parts[p];
+            const float bending = bending_weight(part.material);
+            if (bending <= 0 || part.mesh->empty()) continue;
+            Target target{light, static_cast<int>(p), sphere_around(*part.mesh), 0,
+                          stream_key(options.seed, light, p, 0xca05u)};
+            // Power towards the part, by a few rays: shares photons among the lights fairly.
+            double power = 0;
+            constexpr std::uint32_t kPilotRays = 64;
+            for (std::uint32_t i = 0; i < kPilotRays; ++i) {
+                const PathSampler sampler(target.key ^ 1u, i);
+                power += scene.lights()
+                             .emit(light, target.sphere, sampler.pair(0, 0), sampler.pair(0, 1),
+                                   scene.bounding_sphere())
+                             .power.sum();
+            }
+            if (!(power > 0)) continue;
+            weights.push_back(power * bending);
+            sum += weights.back();
+            targets.push_back(target);
+        }
+    }
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        targets[i].count = static_cast<std::uint64_t>(
+            std::ceil(static_cast<double>(options.photon_count) * weights[i] / sum));
+    }
+    return targets;
+}
+
+/// One ray under way through smooth and glossy parts.
+struct Flight {
+    Vec3f origin, direction;
+    Rgb power;
+    Media media;
+    int depth = 0;
+    bool is_glossy = false;
+    bool has_arrived = false;  ///< stored at a receiver before: later stores are no new power
+};
+
+class Tracer {
+  public:
+    Tracer(const RenderScene& scene, const CausticOptions& options)
+        : scene_(scene), options_(options) {}
+
+    /// Follows the photon `index` of `target` among the parts of `view`; appends its arrivals.
+    /// Returns true when the path met a virtual part.
+    bool trace(const Target& target, std::uint64_t index, std::uint32_t view,
+               std::vector<Photon>& arrivals, PhotonBalance& balance) const {
+        const PathSampler sampler(target.key, static_cast<std::uint32_t>(index));
+        const EmittedRay emitted =
+            scene_.lights().emit(target.light, target.sphere, sampler.pair(0, 0),
+                                 sampler.pair(0, 1), scene_.bounding_sphere());
+        ++balance.shot;
+        if (!(emitted.power > 0).any()) return false;
+        bool is_touched = false;
+        Flight pending[kMaxPending];
+        int pending_count = 0;
+        Flight first;
+        first.origin = emitted.origin;
+        first.direction = emitted.direction;
+        first.power = emitted.power / static_cast<float>(target.count);
+        const float initial = first.power.maxCoeff();
+        pending[pending_count++] = first;
+        while (pending_count > 0) {
+            Flight flight = pending[--pending_count];
+            while (true) {
+                Ray ray{flight.origin, flight.direction, 0.0f, 1e30f, view};
+                const Hit hit = scene_.accel().closest(ray);
+                if (!hit.is_hit()) {
+                    if (flight.depth > 0 && !flight.has_arrived) {
+                        balance.escaped += flight.power.sum();
+                    }
+                    break;
+                }
+                is_touched |= scene_.is_virtual(hit.part);
+                if (flight.depth == 0) {
+                    if (hit.part != target.part) break;
+                    ++balance.met;
+                    balance.emitted += flight.power.sum();
+                }
+                if (flight.depth > options_.max_interfaces) {
+                    if (!flight.has_arrived) balance.ended += flight.power.sum();
+                    break;
+                }
+                if (!step(flight, hit, sampler, initial, pending, pending_count, arrivals, view,
+                          balance)) {
+                    break;
+                }
+            }
+        }
+        return is_touched;
+    }
+
+  private:
+    static constexpr int kMaxPending = 48;
+
+    void absorb(Flight& flight, const Rgb& factor, PhotonBalance& balance) const {
+        const double before = flight.power.sum();
+        flight.power *= factor;
+        if (!flight.has_arrived) balance.absorbed += before - flight.power.sum();
+    }
+
+    /// One surface; false when the flight ends.
+    bool step(Flight& flight, const Hit& hit, const PathSampler& sampler, float initial,
+              Flight* pending, int& pending_count, std::vector<Photon>& arrivals,
+              std::uint32_t view, PhotonBalance& balance) const {
+        const SurfacePoint point = scene_.surface(hit, flight.direction);
+        absorb(flight, scene_.transmittance(flight.media, hit.distance), balance);
+        const int depth = flight.depth++;
+        if (scene_.dielectric(hit.part)) {
+            return pass_interface(flight, point, depth, sampler, initial, pending, pending_count,
+                                  balance);
+        }
+        const Bsdf bsdf = scene_.bsdf(point, hit);
+        if (is_smooth(bsdf)) {
+            absorb(flight, std::get<MirrorBsdf>(bsdf).reflectance, balance);
+            flight.direction = mirror_direction(point, flight.direction);
+            flight.origin = scene_.leave(point, flight.direction);
+            return (flight.power > 0).any();
+        }
+        const bool has_lobe = lobe_probability(bsdf, Lobe::Glossy) > 0;
+        if (depth > 0) {
+            Photon photon;
+            photon.position = point.position;
+            photon.power = flight.power;
+            photon.to_light = PackedDirection(-flight.direction);
+            photon.normal = PackedDirection(point.geometric_normal);
+            photon.views = static_cast<std::uint8_t>(view);
+            photon.is_glossy = flight.is_glossy;
+            photon.keeps_direction = has_lobe;
+            arrivals.push_back(photon);
+            if (!flight.has_arrived) balance.stored += flight.power.sum();
+            flight.has_arrived = true;
+        }
+        if (!has_lobe) return false;
+        return scatter(flight, point, bsdf, depth, sampler, initial, balance);
+    }
+
+    bool pass_interface(Flight& flight, const SurfacePoint& point, int depth,
+                        const PathSampler& sampler, float initial, Flight* pending,
+                        int& pending_count, PhotonBalance& balance) const {
+        const InterfaceEvent event = cross_interface(scene_, point, flight.direction, flight.media);
+        Flight reflected = flight, refracted = flight;
+        reflected.direction = event.reflected;
+        refracted.direction = event.refracted;
+        refracted.media = event.beyond;
+        refracted.origin = scene_.leave(point, refracted.direction);
+        if (!event.is_optical || event.reflectance <= 0) {
+            flight = refracted;
+            return true;
+        }
+        reflected.origin = scene_.leave(point, reflected.direction);
+        if (event.reflectance >= 1) {
+            flight = reflected;
+            return true;
+        }
+        reflected.power *= event.reflectance;
+        refracted.power *= 1 - event.reflectance;
+        // Both branches are followed, the faint one with a chance that shrinks with its power.
+        const bool is_mostly_reflected = event.reflectance > 0.5f;
+        Flight& strong = is_mostly_reflected ? reflected : refracted;
+        Flight& faint = is_mostly_reflected ? refracted : reflected;
+        const Vec2f u = sampler.pair(depth, 2);
+        const float chance = std::min(1.0f, kFaintBranchBoost * faint.power.maxCoeff() / initial);
+        if (gamble(faint, u.x() < chance && pending_count < kMaxPending, chance, balance)) {
+            pending[pending_count++] = faint;
+        }
+        flight = strong;
+        return survive(flight, u.y(), initial, balance);
+    }
+
+    /// Russian roulette: the power of those that stay makes up for those that go.
+    static bool gamble(Flight& flight, bool stays, float chance, PhotonBalance& balance) {
+        const double before = flight.power.sum();
+        if (stays) flight.power /= chance;
+        if (!flight.has_arrived) balance.chance += before - (stays ? flight.power.sum() : 0.0);
+        return stays;
+    }
+
+    static bool survive(Flight& flight, float u, float initial, PhotonBalance& balance) {
+        const float survival = flight.power.maxCoeff() / (initial * kSurePower);
+        return survival >= 1 || gamble(flight, u < survival, survival, balance);
+    }
+
+    bool scatter(Flight& flight, const SurfacePoint& point, const Bsdf& bsdf, int depth,
+                 const PathSampler& sampler, float initial, PhotonBalance& balance) const {
+        const Frame frame(point.shading_normal);
+        const Vec3f wo = frame.to_local(-flight.direction);
+        BsdfSample s = sample(bsdf, wo, sampler.pair(depth, 3), 0x1.fffffep-1f);
+        s.weight *= lobe_probability(bsdf, Lobe::Glossy);
+        const Vec3f direction = frame.to_world(s.wi);
+        if (direction.dot(point.geometric_normal) <= 0) s.weight = Rgb::Zero();
+        absorb(flight, s.weight, balance);
+        if (!(flight.power > 0).any()) return false;
+        flight.direction = direction;
+        flight.origin = scene_.leave(point, direction);
+        flight.is_glossy = true;
+        return survive(flight, sampler.number(depth, 4), initial, balance);
+    }
+
+    const RenderScene& scene_;
+    const CausticOptions& options_;
+};
+
+}  // namespace
+
+PhotonBalance& PhotonBalance::operator+=(const PhotonBalance& other) {
+    emitted += other.emitted;
+    stored += other.stored;
+    escaped += other.escaped;
+    absorbed += other.absorbed;
+    ended += other.ended;
+    chance += other.chance;
+    shot += other.shot;
+    met += other.met;
+    return *this;
+}
+
+CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& options,
+                              const Progress& progress) {
+    CausticPhotons result;
+    const Tracer tracer(scene, options);
+    const bool has_virtual = std::any_of(scene.scene().parts.begin(), scene.scene().parts.end(),
+                                         [](const Part& part) { return part.is_virtual; });
+    constexpr std::size_t kBlock = 8192;
+    const std::vector<Target> targets = find_targets(scene, options);
+    std::size_t done = 0;
+    for (const Target& target : targets) {
+        struct Block {
+            std::vector<Photon> photons;
+            PhotonBalance balance;
+        };
+        std::vector<Block> blocks((target.count + kBlock - 1) / kBlock);
+        parallel_for_blocks(target.count, kBlock, [&](std::size_t begin, std::size_t end) {
+            Block& block = blocks[begin / kBlock];
+            PhotonBalance ignored;
+            for (std::size_t i = begin; i < end; ++i) {
+                const std::size_t old_size = block.photons.size();
+                const bool is_touched =
+                    tracer.trace(target, i, kAllParts, block.photons, block.balance);
+                if (!has_virtual || !is_touched) continue;
+                for (std::size_t k = old_size; k < block.photons.size(); ++k) {
+                    block.photons[k].views = kVirtualParts;
+                }
+                if (!scene.is_virtual(target.part)) {
+                    tracer.trace(target, i, kRealParts, block.photons, ignored);
+                }
+            }
+        });
+        for (Block& block : blocks) {
+            result.photons.insert(result.photons.end(), block.photons.begin(), block.photons.end());
+            result.balance += block.balance;
+            block.photons = {};
+        }
+        progress.update(static_cast<double>(++done) / static_cast<double>(targets.size()),
+                        "photons");
+    }
+    return result;
+}
+
+CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather_radius_m) {
+    const auto radius = static_cast<float>(gather_radius_m);
+    std::vector<Photon> sharp, soft;
+    for (const Photon& photon : photons) (photon.is_glossy ? soft : sharp).push_back(photon);
+    CausticMaps maps;
+    const float soft_radius = kSoftRadiusFactor * radius, wide_radius = kWideRadiusFactor * radius;
+    sharp = merge_photons(sharp, kMergeShare * radius);
+    soft = merge_photons(soft, kMergeShare * soft_radius);
+    maps.sharp = PhotonGrid(sharp, radius);
+    maps.soft = PhotonGrid(soft, soft_radius);
+    sharp.insert(sharp.end(), soft.begin(), soft.end());
+    for (Photon& photon : sharp) photon.keeps_direction = false;
+    maps.wide = PhotonGrid(merge_photons(sharp, kMergeShare * wide_radius), wide_radius);
+    return maps;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,61 @@
+// render/differential.h: what a virtual object changes in a picture (differential rendering,
+// Debevec 1998), split by cause.
+//
+// The scene with the object and the one without share photons and random numbers, and a path that
+// never meets the object is traced once for both: where nothing changed the difference is exactly
+// zero, and the noise that remains is that of the change alone.
+#pragma once
+
+#include "render/render_image.h"
+
+#include <memory>
+#include <span>
+
+namespace vitrine {
+
+struct DifferentialOptions {
+    int min_samples = 16;   ///< paths per pixel everywhere, enough to see where work is needed
+    int max_samples = 384;  ///< paths per pixel where the change is noisy
+    double noise_target = 0.006;  ///< standard error per pixel, of the picture's mean luminance
+    std::uint64_t photon_count = 3'000'000;
+    double gather_radius_m = 0;  ///< 0: half the width of a pixel (see `pixel_radius`)
+    PathOptions paths;
+    std::uint64_t seed = 0;
+};
+
+/// All radiances linear; one camera. Composite: (1 - coverage) * (plate + delta) + object.
+struct DifferentialImage {
+    ImageRgb with;     ///< the rendered scene with the virtual objects
+    ImageRgb without;  ///< the same without them, same random numbers
+    /// delta = shadow + caustics + reflection + refraction + diffuse: change of the real surfaces
+    /// that stay visible, averaged over the uncovered part of the pixel. May be negative.
+    ImageRgb shadow, caustics, reflection, refraction, diffuse;
+    ImageRgb object;    ///< radiance of the virtual surfaces seen directly, times coverage
+    ImageF coverage;    ///< share of the pixel covered by them, antialiased
+    Geometry geometry;  ///< of the scene with the objects, at pixel centres
+    ImageRgb delta() const;
+};
+
+class DifferentialRenderer {
+  public:
+    /// Traces the photons once for all cameras.
+    /// @param real scene without virtual parts: estimated materials and lights
+    /// @param virtual_parts in the world; `is_virtual` is set here
+    /// @param cameras those to be rendered; they set the gather radius
+    DifferentialRenderer(Scene real, std::vector<Part> virtual_parts,
+                         std::span<const Camera> cameras, const DifferentialOptions& options = {},
+                         const Progress& progress = {});
+
+    DifferentialImage render(const Camera& camera, const Progress& progress = {}) const;
+
+    const RenderScene& scene() const { return scene_; }
+    const PhotonBalance& photon_balance() const { return balance_; }
+
+  private:
+    RenderScene scene_;
+    CausticMaps maps_;
+    PhotonBalance balance_;
+    DifferentialOptions options_;
+};
+
+}  // namespace vitrine

@@ -1,0 +1,25 @@
+// render/interface.h: a ray at a dielectric boundary: which media meet, where the two rays go.
+// Shared by camera paths and photons, so that both bend alike.
+#pragma once
+
+#include "render/render_scene.h"
+
+namespace vitrine {
+
+struct InterfaceEvent {
+    bool is_optical = true;    ///< false: hidden inside another medium, the ray goes straight on
+    float reflectance = 0.0f;  ///< unpolarised Fresnel
+    Vec3f reflected = Vec3f::Zero();
+    Vec3f refracted = Vec3f::Zero();  ///< meaningless when reflectance is 1
+    float eta = 1.0f;                 ///< index beyond / index before
+    Media beyond;                     ///< media after crossing
+};
+
+/// @param direction unit, of travel; @param media on this side
+InterfaceEvent cross_interface(const RenderScene& scene, const SurfacePoint& point,
+                               const Vec3f& direction, const Media& media);
+
+/// Mirror direction about the shading normal, kept above the geometric surface.
+Vec3f mirror_direction(const SurfacePoint& point, const Vec3f& direction);
+
+}  // namespace vitrine

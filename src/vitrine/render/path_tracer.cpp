@@ -1,0 +1,311 @@
+#include "render/path_tracer.h"
+
+#include "render/interface.h"
+
+namespace vitrine {
+namespace {
+
+// Uses of a vertex's random numbers.
+constexpr int kBranchUse = 1;
+constexpr int kScatterUse = 2;
+constexpr int kLobeUse = 3;
+constexpr int kPickUse = 4;
+constexpr int kRouletteUse = 5;
+constexpr int kLightUse = 6;  // and one more per light
+
+/// A branch of a split ray fainter than this is left to chance.
+constexpr float kMinSplitShare = 0.01f;
+
+float balance(float a, float b) { return a + b > 0 ? a / (a + b) : 0.0f; }
+
+}  // namespace
+
+struct PathTracer::State {
+    Vec3f origin, direction;
+    Rgb throughput = Rgb::Ones();
+    Media media;
+    int depth = 0;  // vertices so far
+    int diffuse_bounces = 0;
+    int specular_bounces = 0;
+    bool has_receiver = false;      // left a surface that photons are stored on
+    bool is_first_receiver = true;  // the next receiver is the one seen
+    /// Light met now is known from the photons of the last receiver.
+    bool is_covered = false;
+    Layer layer = Layer::Shadow;
+    bool is_layer_fixed = false;  // seen by way of a reflection or refraction
+    bool is_from_first = false;   // left the surface seen by its diffuse lobe
+    float pdf = 0;                // of `direction` at the last receiver; 0 for single directions
+    Vec3f receiver = Vec3f::Zero();
+};
+
+struct PathTracer::Pending {
+    static constexpr int kCapacity = 32;
+    State states[kCapacity];
+    int count = 0;
+};
+
+PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options)
+    : scene_(scene), caustics_(caustics), options_(options) {}
+
+PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
+                             const PathSampler& sampler, std::uint32_t view) const {
+    PathResult result;
+    Pending pending;
+    State& first = pending.states[pending.count++];
+    first.origin = origin;
+    first.direction = direction;
+    while (pending.count > 0) {
+        const State state = pending.states[--pending.count];
+        follow(state, pending, sampler, view, result);
+    }
+    return result;
+}
+
+void PathTracer::follow(State state, Pending& pending, const PathSampler& sampler,
+                        std::uint32_t view, PathResult& result) const {
+    while (true) {
+        const Ray ray{state.origin, state.direction, 0.0f, 1e30f, view};
+        const Hit hit = scene_.accel().closest(ray);
+        state.throughput *= scene_.transmittance(state.media, hit.is_hit() ? hit.distance : 1e30f);
+        add_emission(state, hit.is_hit() ? hit.distance : 1e30f, result);
+        if (!hit.is_hit()) {
+            add_environment(state, result);
+            return;
+        }
+        result.is_touched |= scene_.is_virtual(hit.part);
+        if (state.depth == 0) result.first_part = hit.part;
+        const SurfacePoint point = scene_.surface(hit, state.direction);
+        ++state.depth;
+        if (scene_.dielectric(hit.part)) {
+            if (++state.specular_bounces > options_.max_specular_bounces) return;
+            if (!pass_interface(state, point, pending, sampler)) return;
+            continue;
+        }
+        const Bsdf bsdf = scene_.bsdf(point, hit);
+        if (is_smooth(bsdf)) {
+            if (++state.specular_bounces > options_.max_specular_bounces) return;
+            state.throughput *= std::get<MirrorBsdf>(bsdf).reflectance;
+            state.direction = mirror_direction(point, state.direction);
+            state.origin = scene_.leave(point, state.direction);
+            state.pdf = 0;
+            state.is_covered |= state.has_receiver && caustics_;
+            if (!state.is_layer_fixed && !state.has_receiver) {
+                state.layer = Layer::Reflection;
+                state.is_layer_fixed = true;
+            }
+            continue;
+        }
+        const Frame frame(point.shading_normal);
+        Vec3f wo = frame.to_local(-state.direction);
+        // The rounded surface may face away where the facet does not: keep to the horizon.
+        if (wo.z() <= 0) wo = Vec3f(wo.x(), wo.y(), 1e-4f).normalized();
+        if (!state.is_layer_fixed) {
+            state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
+        }
+        add_direct(state, point, bsdf, frame, wo, sampler, view, result);
+        add_caustics(state, point, bsdf, frame, wo, view, result);
+        if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
+            return;
+        }
+        if (!scatter(state, point, bsdf, frame, wo, sampler)) return;
+    }
+}
+
+void PathTracer::add_emission(const State& state, float distance, PathResult& result) const {
+    if (state.is_covered) return;
+    const LightSampler& lights = scene_.lights();
+    for (std::size_t i = 0; i < lights.count(); ++i) {
+        if (!lights.can_be_hit(i)) continue;
+        const auto hit = lights.hit(i, state.origin, state.direction, distance);
+        if (!hit) continue;
+        float weight = 1.0f;
+        if (state.pdf > 0) {
+            weight =
+                balance(state.pdf, lights.pdf(i, state.receiver, state.direction, hit->distance));
+        }
+        result.layers[static_cast<std::size_t>(state.layer)] +=
+            state.throughput * hit->radiance * weight;
+    }
+}
+
+void PathTracer::add_environment(const State& state, PathResult& result) const {
+    const LightSampler& lights = scene_.lights();
+    Rgb radiance =
+        options_.direct_light_only && state.has_receiver ? Rgb(Rgb::Zero()) : lights.ambient();
+    if (!state.is_covered) {
+        for (const std::size_t i : lights.environments()) {
+            float weight = 1.0f;
+            if (state.pdf > 0) {
+                weight = balance(state.pdf, lights.pdf(i, state.receiver, state.direction, 1e30f));
+            }
+            radiance += lights.environment_radiance(i, state.direction) * weight;
+        }
+    }
+    // An environment seen from the first surface is direct light, whatever its layer says by now.
+    const Layer layer = state.is_from_first && !state.is_layer_fixed ? Layer::Shadow : state.layer;
+    result.layers[static_cast<std::size_t>(layer)] += state.throughput * radiance;
+}
+
+bool PathTracer::is_hidden(const Ray& ray, std::uint32_t view, PathResult& result) const {
+    if (!scene_.accel().is_occluded(ray)) return false;
+    if (view == kAllParts && !result.is_touched) {
+        Ray real = ray;
+        real.mask = kRealParts;
+        result.is_touched = !scene_.accel().is_occluded(real);
+    }
+    return true;
+}
+
+void PathTracer::add_direct(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+                            const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
+                            std::uint32_t view, PathResult& result) const {
+    const LightSampler& lights = scene_.lights();
+    if (lights.count() == 0) return;
+    // All lights at the surface seen; one of them, by turns of chance, at those behind it.
+    const bool takes_all = state.is_first_receiver || lights.count() == 1;
+    std::size_t begin = 0, end = lights.count();
+    float boost = 1.0f;
+    if (!takes_all) {
+        const float u = sampler.number(state.depth, kPickUse);
+        begin = std::min(lights.count() - 1,
+                         static_cast<std::size_t>(u * static_cast<float>(lights.count())));
+        end = begin + 1;
+        boost = static_cast<float>(lights.count());
+    }
+    const Vec3f origin = scene_.leave_smooth(point);
+    for (std::size_t i = begin; i < end; ++i) {
+        const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 9) : 0);
+        const auto s = lights.sample(i, origin, sampler.pair(state.depth, use));
+        if (!s) continue;
+        const Vec3f wi = frame.to_local(s->direction);
+        if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
+        Rgb value = Rgb::Zero();
+        for (const Lobe lobe : {Lobe::Diffuse, Lobe::Glossy}) {
+            // Light that a glossy lobe sends on to an earlier receiver is among its photons.
+            if (lobe == Lobe::Glossy && caustics_ && state.has_receiver) continue;
+            const float probability = lobe_probability(bsdf, lobe);
+            if (probability <= 0) continue;
+            float weight = 1.0f;
+            const bool can_scatter =
+                !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces;
+            if (s->pdf > 0 && can_scatter) {
+                weight = balance(s->pdf, probability * pdf_lobe(bsdf, lobe, wo, wi));
+            }
+            value += weight * eval_lobe(bsdf, lobe, wo, wi);
+        }
+        if (!(value > 0).any()) continue;
+        const Ray shadow{origin, s->direction, 0.0f, s->distance * (1 - 1e-4f), view};
+        if (is_hidden(shadow, view, result)) continue;
+        result.layers[static_cast<std::size_t>(state.layer)] +=
+            state.throughput * value * s->radiance_over_pdf * (boost * wi.z());
+    }
+}
+
+void PathTracer::add_caustics(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+                              const Frame& frame, const Vec3f& wo, std::uint32_t view,
+                              PathResult& result) const {
+    if (!caustics_ || caustics_->empty()) return;
+    const std::uint8_t wanted =
+        static_cast<std::uint8_t>(view == kAllParts ? kVirtualParts : kRealParts);
+    Rgb irradiance = Rgb::Zero(), glossy = Rgb::Zero();
+    const bool has_glossy = !state.has_receiver && lobe_probability(bsdf, Lobe::Glossy) > 0;
+    const auto visit = [&](const Photon& photon, float kernel) {
+        if (view == kAllParts) result.is_touched |= photon.views != kAllParts;
+        if (!(photon.views & wanted)) return;
+        irradiance += kernel * photon.power;
+        if (!has_glossy) return;
+        const Vec3f wi = frame.to_local(photon.to_light.unpack());
+        glossy += kernel * photon.power * eval_lobe(bsdf, Lobe::Glossy, wo, wi);
+    };
+    if (state.has_receiver) {
+        caustics_->wide.gather(point.position, point.geometric_normal, visit);
+    } else {
+        caustics_->sharp.gather(point.position, point.geometric_normal, visit);
+        caustics_->soft.gather(point.position, point.geometric_normal, visit);
+    }
+    const Rgb reflected = irradiance * eval_lobe(bsdf, Lobe::Diffuse, wo, Vec3f(0, 0, 1)) + glossy;
+    const Layer layer = state.is_layer_fixed      ? state.layer
+                        : state.is_first_receiver ? Layer::Caustics
+                                                  : Layer::Diffuse;
+    result.layers[static_cast<std::size_t>(layer)] += state.throughput * reflected;
+}
+
+bool PathTracer::scatter(State& state, const SurfacePoint& point, const Bsdf& bsdf,
+                         const Frame& frame, const Vec3f& wo, const PathSampler& sampler) const {
+    const BsdfSample s = sample(bsdf, wo, sampler.pair(state.depth, kScatterUse),
+                                sampler.number(state.depth, kLobeUse));
+    if (!(s.weight > 0).any()) return false;
+    const Vec3f direction = frame.to_world(s.wi);
+    if (direction.dot(point.geometric_normal) <= 0) return false;
+    state.throughput *= s.weight;
+    const bool was_seen = !state.has_receiver;
+    if (s.lobe == Lobe::Glossy && was_seen && !state.is_layer_fixed) {
+        state.layer = Layer::Reflection;
+        state.is_layer_fixed = true;
+    }
+    // A glossy bounce on the way to an earlier receiver goes on with that receiver's photons.
+    const bool goes_on_covered = s.lobe == Lobe::Glossy && !was_seen && caustics_;
+    state.is_covered = goes_on_covered;
+    state.pdf = goes_on_covered ? 0.0f : s.pdf;
+    state.is_from_first = was_seen && s.lobe == Lobe::Diffuse;
+    state.has_receiver = true;
+    state.is_first_receiver = false;
+    state.direction = direction;
+    state.origin = scene_.leave_smooth(point);
+    state.receiver = state.origin;
+    ++state.diffuse_bounces;
+    if (state.diffuse_bounces > 1) {
+        const float survival = std::min(1.0f, state.throughput.maxCoeff());
+        if (sampler.number(state.depth, kRouletteUse) >= survival) return false;
+        state.throughput /= survival;
+    }
+    return true;
+}
+
+bool PathTracer::pass_interface(State& state, const SurfacePoint& point, Pending& pending,
+                                const PathSampler& sampler) const {
+    const InterfaceEvent event = cross_interface(scene_, point, state.direction, state.media);
+    State reflected = state, refracted = state;
+    refracted.direction = event.refracted;
+    refracted.media = event.beyond;
+    refracted.origin = scene_.leave(point, refracted.direction);
+    if (!event.is_optical) {
+        state = refracted;
+        return true;
+    }
+    reflected.direction = event.reflected;
+    reflected.origin = scene_.leave(point, reflected.direction);
+    for (State* branch : {&reflected, &refracted}) {
+        branch->pdf = 0;
+        branch->is_covered |= state.has_receiver && caustics_;
+        if (!state.is_layer_fixed && !state.has_receiver) {
+            branch->layer = branch == &reflected ? Layer::Reflection : Layer::Refraction;
+            branch->is_layer_fixed = true;
+        }
+    }
+    // Radiance is compressed into a smaller solid angle in the denser medium (Veach 1997, 5.2).
+    const float compression = 1.0f / (event.eta * event.eta);
+    const float f = event.reflectance;
+    if (f >= 1) {
+        state = reflected;
+        return true;
+    }
+    const float faint_share = std::min(f, 1 - f) * state.throughput.maxCoeff();
+    if (!state.has_receiver && state.specular_bounces <= options_.split_depth &&
+        faint_share > kMinSplitShare && pending.count < Pending::kCapacity) {
+        reflected.throughput *= f;
+        refracted.throughput *= (1 - f) * compression;
+        pending.states[pending.count++] = reflected;
+        state = refracted;
+        return true;
+    }
+    if (sampler.number(state.depth, kBranchUse) < f) {
+        state = reflected;
+    } else {
+        state = refracted;
+        state.throughput *= compression;
+    }
+    return true;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,97 @@
+// render/photon_grid.h: photons on surfaces and a hash grid that finds those near a point.
+#pragma once
+
+#include "math/vector.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace vitrine {
+
+/// A unit vector in 32 bits (octahedral map, Cigolle et al. 2014); error below 0.005 degrees.
+struct PackedDirection {
+    std::int16_t x = 0, y = 0;
+    PackedDirection() = default;
+    explicit PackedDirection(const Vec3f& unit);
+    Vec3f unpack() const;
+};
+
+/// 36 bytes.
+struct Photon {
+    Vec3f position = Vec3f::Zero();
+    Rgb power = Rgb::Zero();       ///< W
+    PackedDirection to_light;      ///< where it came from, away from the surface
+    PackedDirection normal;        ///< geometric, on the side it arrived
+    std::uint8_t views = 3;        ///< scenes in which it arrives: kRealParts | kVirtualParts bits
+    bool is_glossy = false;        ///< bent by a glossy lobe somewhere: its pattern is soft
+    bool keeps_direction = false;  ///< the receiver is not Lambertian
+};
+
+/// Photons sorted into cells of twice the gather radius. Building is linear in the count; memory is
+/// 36 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
+class PhotonGrid {
+  public:
+    PhotonGrid() = default;
+    PhotonGrid(const std::vector<Photon>& photons, float radius_m);
+
+    bool empty() const { return photons_.empty(); }
+    std::size_t size() const { return photons_.size(); }
+    float radius() const { return radius_; }
+    const std::vector<Photon>& photons() const { return photons_; }
+
+    /// Calls `visit(photon, kernel)` for each photon within the radius of `position` on a surface
+    /// that faces like `normal`. The kernel (Epanechnikov, 1/m2) integrates to one over a plane:
+    /// irradiance is the sum of kernel * power.
+    template <typename Visit>
+    void gather(const Vec3f& position, const Vec3f& normal, const Visit& visit) const {
+        if (photons_.empty()) return;
+        const Vec3f scaled = position * inverse_cell_ - Vec3f::Constant(0.5f);
+        const Eigen::Vector3i low = scaled.array().floor().cast<int>();
+        const float radius2 = radius_ * radius_;
+        const float scale = 2.0f / (kPif * radius2);
+        std::uint32_t visited[8];
+        int visited_count = 0;
+        for (int corner = 0; corner < 8; ++corner) {
+            const std::uint32_t bucket =
+                bucket_of(low + Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2));
+            bool is_repeated = false;  // two cells in one bucket must not count twice
+            for (int k = 0; k < visited_count; ++k) is_repeated |= visited[k] == bucket;
+            if (is_repeated) continue;
+            visited[visited_count++] = bucket;
+            for (std::uint32_t i = start_[bucket]; i < start_[bucket + 1]; ++i) {
+                const Photon& photon = photons_[i];
+                const Vec3f d = photon.position - position;
+                const float distance2 = d.squaredNorm();
+                if (distance2 >= radius2) continue;
+                // Same sheet: near the tangent plane and facing alike.
+                if (std::abs(d.dot(normal)) > kMaxHeight * radius_) continue;
+                if (photon.normal.unpack().dot(normal) < kMinNormalCos) continue;
+                visit(photon, scale * (1.0f - distance2 / radius2));
+            }
+        }
+    }
+
+  private:
+    static constexpr float kMaxHeight = 0.5f;     // of the radius: tolerates curved receivers
+    static constexpr float kMinNormalCos = 0.5f;  // 60 degrees: across an edge is another face
+
+    std::uint32_t bucket_of(const Eigen::Vector3i& cell) const {
+        const std::uint32_t hash = static_cast<std::uint32_t>(cell.x()) * 73856093u ^
+                                   static_cast<std::uint32_t>(cell.y()) * 19349663u ^
+                                   static_cast<std::uint32_t>(cell.z()) * 83492791u;
+        return (hash ^ hash >> 15) & bucket_mask_;
+    }
+
+    std::vector<Photon> photons_;       // sorted by bucket, input order within
+    std::vector<std::uint32_t> start_;  // first photon of each bucket, and the end
+    std::uint32_t bucket_mask_ = 0;
+    float radius_ = 0.0f;
+    float inverse_cell_ = 0.0f;
+};
+
+/// Sums photons that share a cell of `cell_m`, a facing and the views they belong to, into one at
+/// their mean place. What a gather of radius >= 3 cells finds changes by about 1 %; the cost of a
+/// gather no longer grows with the photon count. Photons that keep their direction stay apart.
+std::vector<Photon> merge_photons(const std::vector<Photon>& photons, float cell_m);
+
+}  // namespace vitrine

@@ -1,0 +1,174 @@
+#include "render/render_scene.h"
+
+#include "base/parallel.h"
+
+#include <numeric>
+
+namespace vitrine {
+namespace {
+
+/// Ray epsilons between glass and what it stands on.
+constexpr float kContactGapEpsilons = 4.0f;
+
+Accel build_accel(const std::vector<Part>& parts) {
+    std::vector<AccelPart> items;
+    for (const Part& part : parts) {
+        items.push_back({part.mesh, part.is_virtual ? kVirtualParts : kRealParts});
+    }
+    return items.empty() ? Accel() : Accel(std::move(items));
+}
+
+/// Moves the vertices of dielectric parts that coincide with an opaque surface inward by the gap.
+/// Returns true when a mesh was replaced.
+bool open_contact_gaps(Scene& scene, const Accel& accel, float epsilon) {
+    const float gap = kContactGapEpsilons * epsilon;
+    bool is_changed = false;
+    for (Part& part : scene.parts) {
+        if (!std::holds_alternative<Dielectric>(part.material)) continue;
+        const Mesh& mesh = *part.mesh;
+        std::vector<Vec3f> moved = mesh.vertices;
+        // Flat normals: a rim belongs to the wall and to the base, and both may touch.
+        std::vector<std::vector<Vec3f>> faces(mesh.vertices.size());
+        for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+            const Vec3f n = triangle_normal(mesh, t);
+            if (!n.allFinite()) continue;
+            for (int k = 0; k < 3; ++k) {
+                auto& list = faces[static_cast<std::size_t>(mesh.triangles[t][k])];
+                const bool is_known = std::any_of(list.begin(), list.end(),
+                                                  [&](const Vec3f& m) { return m.dot(n) > 0.99f; });
+                if (!is_known && list.size() < 6) list.push_back(n);
+            }
+        }
+        parallel_for(mesh.vertices.size(), 1024, [&](std::size_t i) {
+            for (const Vec3f& n : faces[i]) {
+                Ray ray;
+                ray.origin = mesh.vertices[i] - 2 * gap * n;
+                ray.direction = n;
+                for (int tries = 0; tries < 4; ++tries) {  // past the glass itself
+                    ray.max_distance = gap - (ray.origin - mesh.vertices[i]).dot(n);
+                    const Hit hit = accel.closest(ray);
+                    if (!hit.is_hit()) break;
+                    const Part& other = scene.parts[static_cast<std::size_t>(hit.part)];
+                    const Vec3f place = ray.origin + hit.distance * n;
+                    if (!std::holds_alternative<Dielectric>(other.material)) {
+                        const float clearance = (place - moved[i]).dot(n);
+                        if (clearance < gap) moved[i] -= (gap - clearance) * n;
+                        break;
+                    }
+                    ray.origin = place + 0.25f * epsilon * n;
+                }
+            }
+        });
+        if (moved == mesh.vertices) continue;
+        auto copy = std::make_shared<Mesh>(mesh);
+        copy->vertices = std::move(moved);
+        part.mesh = copy;
+        is_changed = true;
+    }
+    return is_changed;
+}
+
+}  // namespace
+
+bool Media::contains(int part) const {
+    return std::find(parts_, parts_ + count_, part) != parts_ + count_;
+}
+
+void Media::enter(int part, const std::vector<int>& rank) {
+    if (count_ == kCapacity || contains(part)) return;
+    int slot = count_++;
+    const auto rank_of = [&](int p) { return rank[static_cast<std::size_t>(p)]; };
+    for (; slot > 0 && rank_of(parts_[slot - 1]) > rank_of(part); --slot) {
+        parts_[slot] = parts_[slot - 1];
+    }
+    parts_[slot] = part;
+}
+
+void Media::leave(int part) {
+    int* const end = std::remove(parts_, parts_ + count_, part);
+    count_ = static_cast<int>(end - parts_);
+}
+
+RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
+    epsilon_ = static_cast<float>(ray_epsilon(scene_));
+    accel_ = build_accel(scene_.parts);
+    if (open_contact_gaps(scene_, accel_, epsilon_)) accel_ = build_accel(scene_.parts);
+    lights_ = LightSampler(scene_.lights, scene_.ambient_radiance);
+    const Box3 box = bounds(scene_);
+    if (!box.is_empty()) {
+        bounding_sphere_ = {box.centre().cast<float>(), static_cast<float>(box.radius())};
+    }
+    std::vector<double> volumes;
+    for (const Part& part : scene_.parts) volumes.push_back(std::abs(volume(*part.mesh)));
+    std::vector<int> order(volumes.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+        return volumes[static_cast<std::size_t>(a)] < volumes[static_cast<std::size_t>(b)];
+    });
+    medium_rank_.resize(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        medium_rank_[static_cast<std::size_t>(order[i])] = static_cast<int>(i);
+    }
+}
+
+Rgb RenderScene::transmittance(const Media& media, float distance) const {
+    const Dielectric* medium = dielectric(media.current());
+    if (!medium || (medium->sigma_a_per_m == 0).all()) return Rgb::Ones();
+    return (-medium->sigma_a_per_m * distance).exp();
+}
+
+SurfacePoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {
+    const Mesh& mesh = *accel_.parts()[static_cast<std::size_t>(hit.part)].mesh;
+    SurfacePoint point;
+    point.part = hit.part;
+    point.distance = hit.distance;
+    point.position = hit_point(mesh, hit);
+    point.is_front = hit.normal.dot(ray_direction) <= 0;
+    const float side = point.is_front ? 1.0f : -1.0f;
+    point.geometric_normal = side * hit.normal;
+    point.shading_normal = side * shading_normal(mesh, hit);
+    point.smooth_position = point.position;
+    if (!mesh.normals.empty()) {
+        // Hanika 2021, "Hacking the shadow terminator": the point seen from the tangent planes of
+        // the vertices, lifted where these lie above it.
+        const Triangle& t = mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+        const float weights[3] = {1 - hit.barycentric.x() - hit.barycentric.y(),
+                                  hit.barycentric.x(), hit.barycentric.y()};
+        for (int k = 0; k < 3; ++k) {
+            const auto v = static_cast<std::size_t>(t[k]);
+            const Vec3f n = side * mesh.normals[v];
+            const float below = std::min(0.0f, (point.position - mesh.vertices[v]).dot(n));
+            point.smooth_position -= weights[k] * below * n;
+        }
+    }
+    return point;
+}
+
+Rgb RenderScene::diffuse_albedo(int part, const Hit& hit) const {
+    const Part& p = scene_.parts[static_cast<std::size_t>(part)];
+    if (const auto* ward = std::get_if<Ward>(&p.material)) return ward->rho_d;
+    const auto* diffuse = std::get_if<Diffuse>(&p.material);
+    if (!diffuse) return Rgb::Zero();
+    if (diffuse->albedo_texture && !p.mesh->uv.empty()) {
+        const ImageRgb& texture = *diffuse->albedo_texture;
+        const Vec2f uv = interpolate_uv(*p.mesh, hit);
+        return bilinear(texture, uv.x() * static_cast<float>(texture.width()) - 0.5f,
+                        (1.0f - uv.y()) * static_cast<float>(texture.height()) - 0.5f);
+    }
+    if (diffuse->use_vertex_colours && !p.mesh->colours.empty()) {
+        return interpolate_colour(*p.mesh, hit);
+    }
+    return diffuse->albedo;
+}
+
+Bsdf RenderScene::bsdf(const SurfacePoint& point, const Hit& hit) const {
+    const Material& m = material(point.part);
+    if (const auto* ward = std::get_if<Ward>(&m)) {
+        return WardBsdf{ward->rho_d, ward->rho_s, static_cast<float>(ward->sigma_x),
+                        static_cast<float>(ward->sigma_y), ward->form == WardForm::Duer};
+    }
+    if (const auto* mirror = std::get_if<Mirror>(&m)) return MirrorBsdf{mirror->reflectance};
+    return DiffuseBsdf{diffuse_albedo(point.part, hit)};
+}
+
+}  // namespace vitrine

@@ -1,0 +1,104 @@
+// render/render_scene.h: a `Scene` made ready for tracing rays: hierarchy, lights, media.
+#pragma once
+
+#include "render/bsdf.h"
+#include "render/light_sampler.h"
+#include "scene/scene.h"
+#include "trace/accel.h"
+
+namespace vitrine {
+
+/// Ray masks: which parts a ray can see.
+constexpr std::uint32_t kRealParts = 1;
+constexpr std::uint32_t kVirtualParts = 2;
+constexpr std::uint32_t kAllParts = kRealParts | kVirtualParts;
+
+/// The dielectrics a path is inside of. Where bodies overlap, the one of smallest volume displaces
+/// the others: a bubble in a block, the thin wall of a glass against the drink poured into it.
+class Media {
+  public:
+    static constexpr int kNone = -1;
+
+    /// Part whose medium fills the place, or kNone for air.
+    int current() const { return count_ > 0 ? parts_[0] : kNone; }
+    bool contains(int part) const;
+    /// @param rank order of precedence per part: lower displaces higher
+    void enter(int part, const std::vector<int>& rank);
+    void leave(int part);
+
+  private:
+    static constexpr int kCapacity = 6;  // more bodies inside each other are not told apart
+    int parts_[kCapacity] = {};          // sorted by rank
+    int count_ = 0;
+};
+
+/// A surface point that a ray has met, seen from where the ray came.
+struct SurfacePoint {
+    int part = -1;
+    float distance = 0.0f;
+    Vec3f position = Vec3f::Zero();
+    Vec3f geometric_normal = Vec3f::Zero();  ///< towards the ray's origin
+    Vec3f shading_normal = Vec3f::Zero();    ///< on the side of geometric_normal
+    Vec3f smooth_position = Vec3f::Zero();   ///< lifted to the rounded surface, for shadow rays
+    bool is_front = true;                    ///< the ray came from outside the mesh
+};
+
+class RenderScene {
+  public:
+    RenderScene() = default;
+    /// Copies the scene's values (meshes are shared). Parts with `is_virtual` answer only to rays
+    /// whose mask has kVirtualParts. Glass that touches something opaque is set off from it by a
+    /// gap of a few ray epsilons (optical contact needs a liquid; a table has air in between), so
+    /// that no ray slips through both surfaces at once.
+    explicit RenderScene(Scene scene);
+
+    const Scene& scene() const { return scene_; }
+    const Accel& accel() const { return accel_; }
+    const LightSampler& lights() const { return lights_; }
+    float epsilon() const { return epsilon_; }
+    const Sphere& bounding_sphere() const { return bounding_sphere_; }
+    const std::vector<int>& medium_rank() const { return medium_rank_; }
+    const Material& material(int part) const {
+        return scene_.parts[static_cast<std::size_t>(part)].material;
+    }
+    bool is_virtual(int part) const {
+        return scene_.parts[static_cast<std::size_t>(part)].is_virtual;
+    }
+    const Dielectric* dielectric(int part) const {
+        return part < 0 ? nullptr : std::get_if<Dielectric>(&material(part));
+    }
+    float ior(const Media& media) const {
+        const Dielectric* medium = dielectric(media.current());
+        return medium ? static_cast<float>(medium->ior) : 1.0f;
+    }
+    /// exp(-sigma_a distance) of the medium a path is in.
+    Rgb transmittance(const Media& media, float distance) const;
+
+    /// The surface that `hit` of a ray found.
+    SurfacePoint surface(const Hit& hit, const Vec3f& ray_direction) const;
+    /// Scattering of an opaque or mirror part at a point; dielectrics need the media and are not
+    /// answered here.
+    Bsdf bsdf(const SurfacePoint& point, const Hit& hit) const;
+    Rgb diffuse_albedo(int part, const Hit& hit) const;
+
+    /// Start of a ray that leaves `point` towards `direction`, off the surface by epsilon.
+    Vec3f leave(const SurfacePoint& point, const Vec3f& direction) const {
+        const float side = direction.dot(point.geometric_normal) < 0 ? -epsilon_ : epsilon_;
+        return point.position + side * point.geometric_normal;
+    }
+    /// As `leave`, for the bright side of opaque surfaces: starts on the rounded surface that the
+    /// shading normals describe, so that facets do not shade themselves at the terminator.
+    Vec3f leave_smooth(const SurfacePoint& point) const {
+        return point.smooth_position + epsilon_ * point.geometric_normal;
+    }
+
+  private:
+    Scene scene_;
+    Accel accel_;
+    LightSampler lights_;
+    Sphere bounding_sphere_;
+    std::vector<int> medium_rank_;
+    float epsilon_ = 1e-6f;
+};
+
+}  // namespace vitrine

@@ -1,0 +1,39 @@
+// render/sampler.h: the random numbers of one camera sample or one photon path.
+//
+// The first dimensions, which carry most of the variance, come as well spread pairs (Owen-scrambled
+// Sobol points, Burley 2020); the rest from a stream keyed by the same numbers. A vertex draws from
+// its own dimensions, so that two paths which agree up to a vertex go on with the same numbers.
+#pragma once
+
+#include "base/rng.h"
+#include "math/vector.h"
+
+namespace vitrine {
+
+/// Point `index` of a (0, 2)-sequence, scrambled by `seed`: any 2^k points from 0 are stratified.
+Vec2f sobol_pair(std::uint32_t index, std::uint32_t seed);
+
+class PathSampler {
+  public:
+    /// @param stream key of the pixel or photon set; @param index of the sample within it
+    PathSampler(std::uint64_t stream, std::uint32_t index) : stream_(stream), index_(index) {}
+
+    /// Pair for use `purpose` at vertex `depth`; stratified over `index` for the first vertices.
+    Vec2f pair(int depth, int purpose) const {
+        const std::uint64_t key =
+            stream_key(stream_, static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose));
+        if (depth <= kStratifiedDepth) return sobol_pair(index_, static_cast<std::uint32_t>(key));
+        const std::uint64_t bits = mix_bits(key ^ (std::uint64_t{index_} << 32 | index_));
+        return {static_cast<float>(bits >> 40) * 0x1p-24f,
+                static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
+    }
+    float number(int depth, int purpose) const { return pair(depth, purpose).x(); }
+
+  private:
+    // Beyond the second diffuse bounce stratification buys nothing measurable.
+    static constexpr int kStratifiedDepth = 3;
+    std::uint64_t stream_;
+    std::uint32_t index_;
+};
+
+}  // namespace vitrine
