@@ -1,5 +1,5 @@
-// pipeline/report.h: one self-contained HTML page about a run: pictures with a slider, the light drawn
-// over the scene, the estimates with their doubt.
+// pipeline/report.h: one self-contained HTML page about a run: pictures with a slider, the light
+// drawn over the scene, the estimates with their doubt.
 #pragma once
 
 #include <filesystem>
