@@ -1,0 +1,50 @@
+// render/translucent_relief.h: the diffuse light leaving a translucent relief.
+#pragma once
+
+#include "optics/radial_profile.h"
+#include "render/translucent_samples.h"
+
+namespace vitrine {
+
+struct TranslucentRenderOptions {
+    int cells_per_side = 5000;  ///< 2000 previews at 1.5 % error, 5000 gives 0.6 %
+    double eta = 1.3;           ///< for the light that leaves
+    double min_cos_out = 0.35;  ///< cosines to the viewer are raised to this in the transmittance
+                                ///< out: true rims get back by grazing reflection what they lose
+};
+
+/// Renders one relief under changing light and material (Jensen et al. 2001, Eq. 5):
+///   C(x) = F_t(n . v) / pi * sum over front and back of R_d(|x - y|) E(y) dA
+/// on a coarse lattice, then brought to full resolution with the near field, which a lattice
+/// cannot hold, put back from the full-resolution irradiance. This takes the place of
+/// translucent shadow maps (Dachsbacher and Stamminger 2003): same idea, both sides, bounded error.
+///
+/// Construction costs O(pixels); each render O(cells^2) + O(pixels): about 0.1 s per megapixel.
+/// Same bits for any thread count.
+class TranslucentRelief {
+  public:
+    explicit TranslucentRelief(Relief relief, const TranslucentRenderOptions& options = {});
+
+    /// Radiance leaving toward the viewer, without reflections; 0 outside the mask. `profile` in
+    /// pixels of this relief.
+    ImageRgb render(const ReliefIrradiance& irradiance, const RadialProfile& profile) const;
+
+    const Relief& relief() const { return relief_; }
+    const ReliefSamples& samples() const { return samples_; }
+
+  private:
+    std::vector<Rgb> gather(const ReliefIrradiance& irradiance, const RadialProfile& far) const;
+
+    Relief relief_;
+    TranslucentRenderOptions options_;
+    ReliefSamples samples_;
+};
+
+/// The same integral with every pixel as sample and receiver: the reference for tests and
+/// benchmarks. O(pixels^2): for small pictures, or for every `stride`-th receiver (others stay 0).
+ImageRgb render_translucent_brute_force(const Relief& relief, const ReliefIrradiance& irradiance,
+                                        const RadialProfile& profile,
+                                        const TranslucentRenderOptions& options = {},
+                                        int stride = 1);
+
+}  // namespace vitrine

@@ -1,0 +1,116 @@
+#include "render/translucent_samples.h"
+
+#include "base/parallel.h"
+#include "optics/fresnel.h"
+
+namespace vitrine {
+
+double fresnel_transmittance(double cos_outside, double eta) {
+    if (cos_outside <= 0) return 0;
+    if (eta == 1.0) return 1;
+    return 1 - fresnel_dielectric(std::min(cos_outside, 1.0), eta);
+}
+
+double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta) {
+    const double cosine = normal.cast<double>().dot(direction);
+    return cosine <= 0 ? 0 : cosine * fresnel_transmittance(cosine, eta);
+}
+
+ReliefSamples sample_relief(const Relief& relief, int per_side) {
+    VITRINE_CHECK_GT(per_side, 0);
+    const Mask& mask = relief.mask;
+    std::size_t inside = 0;
+    int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
+    for (int y = 0; y < mask.height(); ++y) {
+        for (int x = 0; x < mask.width(); ++x) {
+            if (!is_inside(mask, x, y)) continue;
+            ++inside;
+            x0 = std::min(x0, x);
+            x1 = std::max(x1, x);
+            y0 = std::min(y0, y);
+            y1 = std::max(y1, y);
+        }
+    }
+    VITRINE_CHECK_GT(inside, 0u);
+    ReliefSamples samples;
+    // Whole pixels: cells of unequal size would alias narrow kernels.
+    samples.step_px =
+        std::max(1.0, std::round(std::sqrt(static_cast<double>(inside) / per_side)));
+    samples.origin_x = x0;
+    samples.origin_y = y0;
+    const double step = samples.step_px;
+    const int columns = static_cast<int>((x1 - x0) / step) + 1;
+    const int rows = static_cast<int>((y1 - y0) / step) + 1;
+    samples.cell = Image<std::int32_t>(columns, rows, -1);
+
+    struct Sum {
+        Vec3 position = Vec3::Zero(), normal = Vec3::Zero();
+        double area = 0, count = 0;
+    };
+    std::vector<Sum> sums(samples.cell.size());
+    for (int y = y0; y <= y1; ++y) {
+        for (int x = x0; x <= x1; ++x) {
+            if (!is_inside(mask, x, y)) continue;
+            Sum& sum =
+                sums[static_cast<std::size_t>((y - y0) / step) * static_cast<std::size_t>(columns) +
+                     static_cast<std::size_t>((x - x0) / step)];
+            const Vec3f& n = relief.normals(x, y);
+            const double area = 1 / std::max(n.z(), kMinAreaCos);
+            sum.position += relief.point(x, y).cast<double>();
+            sum.normal += n.cast<double>() * area;
+            sum.area += area;
+            sum.count += 1;
+        }
+    }
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+        if (sums[k].count == 0) continue;
+        samples.cell[k] = static_cast<std::int32_t>(samples.position.size());
+        samples.position.push_back((sums[k].position / sums[k].count).cast<float>());
+        samples.normal.push_back(sums[k].normal.normalized().cast<float>());
+        samples.area_px2.push_back(static_cast<float>(sums[k].area));
+    }
+    samples.front_count = samples.position.size();
+    for (std::size_t k = 0; k < samples.front_count; ++k) {
+        const Vec3f p = samples.position[k], n = samples.normal[k];
+        samples.position.push_back({p.x(), p.y(), -p.z()});
+        samples.normal.push_back({n.x(), n.y(), -n.z()});
+        samples.area_px2.push_back(samples.area_px2[k]);
+    }
+    return samples;
+}
+
+ReliefIrradiance irradiance_from_lights(const Relief& relief, const ViewLights& lights,
+                                        double eta) {
+    ReliefIrradiance result{ImageRgb(relief.mask.width(), relief.mask.height()),
+                            ImageRgb(relief.mask.width(), relief.mask.height())};
+    parallel_for(static_cast<std::size_t>(relief.mask.height()), 8, [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        for (int x = 0; x < relief.mask.width(); ++x) {
+            if (!is_inside(relief.mask, x, y)) continue;
+            const Vec3f n = relief.normals(x, y);
+            Rgbd front = lights.ambient, back = lights.ambient;
+            for (const ViewLight& light : lights.lights) {
+                front += light.intensity * entering_irradiance(n, light.direction, eta);
+                back += light.intensity *
+                        entering_irradiance({n.x(), n.y(), -n.z()}, light.direction, eta);
+            }
+            result.front(x, y) = front.cast<float>();
+            result.back(x, y) = back.cast<float>();
+        }
+    });
+    return result;
+}
+
+double normalise_lights(ViewLights& lights, const Relief& relief, double eta) {
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, lights, eta);
+    float brightest = 0;
+    for (std::size_t i = 0; i < relief.mask.size(); ++i)
+        if (relief.mask[i] > 127) brightest = std::max(brightest, luminance(irradiance.front[i]));
+    if (brightest <= 0) return 1;
+    const double factor = kPi / brightest;
+    for (ViewLight& light : lights.lights) light.intensity *= factor;
+    lights.ambient *= factor;
+    return factor;
+}
+
+}  // namespace vitrine

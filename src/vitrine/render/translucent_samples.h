@@ -1,0 +1,46 @@
+// render/translucent_samples.h: the closed surface of a relief as a coarse set of samples, and the
+// light that enters it.
+#pragma once
+
+#include "scene/relief.h"
+
+#include <vector>
+
+namespace vitrine {
+
+/// Cells of a square lattice over the mask, front and mirrored back. Viewer frame, pixels.
+struct ReliefSamples {
+    std::vector<Vec3f> position;  ///< front samples first, then back ones in the same order
+    std::vector<Vec3f> normal;    ///< unit
+    std::vector<float> area_px2;  ///< of the curved surface in the cell
+    std::size_t front_count = 0;
+    double step_px = 1;        ///< side of a cell
+    Image<std::int32_t> cell;  ///< lattice of front sample numbers, -1 where there is no object
+    int origin_x = 0, origin_y = 0;  ///< pixel at the lattice's corner: locked to the object's box
+};
+
+/// Surface per projected area is capped at 1 / kMinAreaCos: rim pixels are only partly object.
+constexpr float kMinAreaCos = 0.15f;
+
+/// About `per_side` samples on each side. The back mirrors the front about the silhouette plane
+/// (the assumption of the paper): position (x, y, -z), normal (nx, ny, -nz).
+ReliefSamples sample_relief(const Relief& relief, int per_side);
+
+/// Unpolarised Fresnel transmittance into a medium of index `eta`; 1 when eta = 1.
+double fresnel_transmittance(double cos_outside, double eta);
+
+/// What a distant light of unit irradiance sends through a surface of normal n.
+double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta);
+
+/// Irradiance that enters the object per surface area, on the visible side and on the mirrored
+/// back. Linear in the lights.
+struct ReliefIrradiance {
+    ImageRgb front, back;
+};
+ReliefIrradiance irradiance_from_lights(const Relief& relief, const ViewLights& lights, double eta);
+
+/// Scales the lights so that the brightest visible surface gets irradiance pi (luminance).
+/// @returns the factor
+double normalise_lights(ViewLights& lights, const Relief& relief, double eta);
+
+}  // namespace vitrine

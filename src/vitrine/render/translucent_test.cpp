@@ -1,0 +1,115 @@
+#include "base/parallel.h"
+#include "render/translucent_relief.h"
+
+#include <gtest/gtest.h>
+
+namespace vitrine {
+namespace {
+
+Relief ball(int size, double radius) {
+    Relief relief;
+    relief.mask = Mask(size, size);
+    relief.depth_px = ImageF(size, size);
+    relief.normals = Image<Vec3f>(size, size, Vec3f(0, 0, 1));
+    relief.inradius_px = radius;
+    for (int y = 0; y < size; ++y) {
+        for (int x = 0; x < size; ++x) {
+            const double u = x - 0.5 * (size - 1), v = 0.5 * (size - 1) - y;
+            const double rest = radius * radius - u * u - v * v;
+            if (rest <= 0) continue;
+            relief.mask(x, y) = 255;
+            relief.depth_px(x, y) = static_cast<float>(std::sqrt(rest));
+            relief.normals(x, y) = Vec3f(static_cast<float>(u), static_cast<float>(v),
+                                         static_cast<float>(std::sqrt(rest)))
+                                       .normalized();
+        }
+    }
+    return relief;
+}
+
+ViewLights key_and_back() {
+    ViewLights lights;
+    lights.lights.push_back({Vec3(-0.5, 0.5, 0.7).normalized(), Rgbd(2, 2, 2)});
+    lights.lights.push_back({Vec3(0.6, 0.4, -0.7).normalized(), Rgbd(3, 2, 1)});
+    lights.ambient = Rgbd::Constant(0.1);
+    return lights;
+}
+
+/// Largest relative difference to the brute force over the object, mean of channels.
+double mean_error(const ImageRgb& image, const ImageRgb& truth, const Mask& mask) {
+    double sum = 0, norm = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] <= 127 || truth[i].isZero()) continue;
+        sum += (image[i] - truth[i]).abs().sum();
+        norm += truth[i].sum();
+    }
+    return sum / norm;
+}
+
+TEST(Translucent, CoarseLatticeAgreesWithBruteForce) {
+    const Relief relief = ball(128, 58);
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, key_and_back(), 1.3);
+    TranslucentRenderOptions options;
+    options.cells_per_side = 1100;  // cells of 3 pixels
+    for (const double width : {4.0, 8.0, 16.0}) {
+        const TwoExponentials fit{0.05 / (width * width), -1 / width, 0.01 / (width * width),
+                                  -0.4 / width};
+        const RadialProfile profile = tabulate({fit, fit.scaled(1.3), fit.scaled(0.7)}, 0.01, 300);
+        const ImageRgb truth =
+            render_translucent_brute_force(relief, irradiance, profile, options, 3);
+        const TranslucentRelief renderer(relief, options);
+        EXPECT_LT(mean_error(renderer.render(irradiance, profile), truth, relief.mask), 0.01)
+            << width;
+    }
+}
+
+TEST(Translucent, NarrowKernelIsLambertian) {
+    const Relief relief = ball(160, 70);
+    ViewLights lights;
+    lights.lights.push_back({Vec3(0, 0, 1), Rgbd::Ones()});
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, lights, 1.0);
+    const TwoExponentials fit{0.5 / (2 * kPi) * 100, -10.0, 0, -1};  // albedo 0.5, 0.1 px wide
+    TranslucentRenderOptions options;
+    options.eta = 1.0;
+    const ImageRgb image =
+        TranslucentRelief(relief, options).render(irradiance, tabulate({fit, fit, fit}, 1e-3, 20));
+    EXPECT_NEAR(image(80, 80)[0], 0.5 / kPi, 0.01);
+    EXPECT_NEAR(image(110, 80)[1], 0.5 / kPi * relief.normals(110, 80).z(), 0.01);
+}
+
+TEST(Translucent, BackLightGlowsThroughThinParts) {
+    const Relief relief = ball(128, 58);
+    ViewLights lights;
+    lights.lights.push_back({Vec3(0, 0, -1), Rgbd::Ones()});
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, lights, 1.3);
+    const TwoExponentials fit{1e-3, -1 / 15.0, 0, -1};
+    const ImageRgb image =
+        TranslucentRelief(relief).render(irradiance, tabulate({fit, fit, fit}, 0.01, 300));
+    EXPECT_GT(image(64, 64)[0], 0);
+    EXPECT_GT(image(64 + 52, 64)[0], 3 * image(64, 64)[0]);  // thin near the rim
+}
+
+TEST(Translucent, NormalisedLightsReachPi) {
+    const Relief relief = ball(100, 40);
+    ViewLights lights = key_and_back();
+    normalise_lights(lights, relief, 1.3);
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, lights, 1.3);
+    float brightest = 0;
+    for (const Rgb& e : irradiance.front) brightest = std::max(brightest, luminance(e));
+    EXPECT_NEAR(brightest, kPi, 1e-4);
+}
+
+TEST(Translucent, SameBitsOnAnyThreadCount) {
+    const Relief relief = ball(100, 40);
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, key_and_back(), 1.3);
+    const TwoExponentials fit{0.01, -0.2, 0, -1};
+    const RadialProfile profile = tabulate({fit, fit, fit}, 0.01, 200);
+    set_thread_count(1);
+    const ImageRgb one = TranslucentRelief(relief).render(irradiance, profile);
+    set_thread_count(0);
+    const ImageRgb all = TranslucentRelief(relief).render(irradiance, profile);
+    for (std::size_t i = 0; i < one.size(); ++i) EXPECT_TRUE((one[i] == all[i]).all());
+}
+
+}  // namespace
+}  // namespace vitrine
