@@ -98,14 +98,17 @@ Relief shade_to_shape(const ImageRgb& diffuse, const Mask& mask, const ReliefOpt
     relief.depth_px = ImageF(mask.width(), mask.height());
     const auto scale = static_cast<float>(relief.inradius_px * options.depth);
     const auto gain = static_cast<float>(options.alpha * options.detail_gain);
+    ImageF base_px(mask.width(), mask.height());
     for (std::size_t i = 0; i < u.size(); ++i) {
         if (mask[i] <= 127) continue;
         const float dome = std::sqrt(std::max(u[i], 0.0f) / highest);
+        base_px[i] = scale * dome;
         // The detail fades toward the rim, where it would move the contour.
         relief.depth_px[i] =
             scale * std::max(dome + gain * detail[i] * std::sqrt(dome), 0.02f * dome);
     }
     relief.normals = relief_normals(relief.depth_px, mask);
+    relief.base_normals = options.alpha > 0 ? relief_normals(base_px, mask) : relief.normals;
     return relief;
 }
 

@@ -15,6 +15,7 @@ struct Relief {
     Mask mask;               ///< 255 where there is an object
     ImageF depth_px;         ///< height above the silhouette plane z = 0; 0 outside
     Image<Vec3f> normals;    ///< unit, viewer frame; (0, 0, 1) outside
+    Image<Vec3f> base_normals;  ///< of the smooth base without shading detail; empty: use `normals`
     double inradius_px = 0;  ///< of the mask: the unit of every length parameter
 
     Vec3f point(int x, int y) const {

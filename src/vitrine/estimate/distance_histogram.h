@@ -1,0 +1,58 @@
+// estimate/distance_histogram.h: the light around each observed point, sorted by distance. With it
+// the image of any radial kernel is a small product: what makes every fit take milliseconds.
+#pragma once
+
+#include "render/translucent_samples.h"
+
+#include <Eigen/Core>
+
+#include <functional>
+#include <vector>
+
+namespace vitrine {
+
+/// A kernel R(r) of one channel, per area.
+using RadialKernel = std::function<double(double r)>;
+
+/// Points of a relief at which the picture is compared with the model.
+struct ReliefObservations {
+    std::vector<Vec3f> position;
+    std::vector<Vec3f> normal;
+    std::vector<std::size_t> pixel;
+};
+
+/// Draws `count` pixels without replacement from the mask minus `excluded` minus a rim of
+/// `rim_px`, facing the viewer with n_z > `min_cos`. Fewer when there are fewer.
+ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
+                                     double rim_px, double min_cos, std::uint64_t seed);
+
+/// For L source fields at once: node k of observation p holds sum_i hat_k(r_pi) value(i, l), the
+/// sources spread onto the two radial nodes around their distance.
+class DistanceHistogram {
+  public:
+    /// @param source_values samples x L: entering irradiance times area, per sample and field
+    /// @param local_values observations x L: entering irradiance at the observation itself
+    DistanceHistogram(const ReliefObservations& observations, const ReliefSamples& samples,
+                      const Eigen::MatrixXf& source_values, const Eigen::MatrixXf& local_values);
+
+    /// Column l: the exitance sum_i R(r_pi) E_i dA_i of field l at each observation. What lies
+    /// nearer than 1.5 cells is split as in the renderer: a Gaussian cap from the samples, the
+    /// rest from the irradiance at the point itself. Cost observations x nodes x L.
+    Eigen::MatrixXd image_of(const RadialKernel& kernel) const;
+
+    /// The same for a table of kernel values given at every node of `nodes()`, without the split.
+    Eigen::MatrixXd image_of_nodes(const Eigen::VectorXd& values) const;
+
+    const std::vector<double>& nodes() const { return nodes_; }
+    double step_px() const { return step_; }
+
+  private:
+    std::vector<double> nodes_;
+    double step_;
+    std::size_t observation_count_;
+    Eigen::Index field_count_;
+    std::vector<float> sums_;  ///< [observation][node][field]
+    Eigen::MatrixXd local_;
+};
+
+}  // namespace vitrine

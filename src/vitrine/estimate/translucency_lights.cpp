@@ -1,0 +1,307 @@
+#include "estimate/translucency_lights.h"
+
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "estimate/distance_histogram.h"
+#include "image/colour.h"
+#include "image/filter.h"
+#include "math/nnls.h"
+
+#include <numeric>
+
+namespace vitrine {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// The picture as the fit sees it: luminance over what leaves the surface, mean 1.
+VectorXd observed_exitance(const ImageRgb& diffuse, const Relief& relief,
+                           const ReliefObservations& observations, double eta) {
+    ImageRgb inside = diffuse;
+    const ImageF y = gaussian_blur(luminance_image(inside), 1.0);
+    VectorXd result(static_cast<Index>(observations.pixel.size()));
+    for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
+        const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
+        result[static_cast<Index>(p)] =
+            y[observations.pixel[p]] / fresnel_transmittance(cosine, eta);
+    }
+    (void)relief;
+    return result / std::max(result.mean(), 1e-12);
+}
+
+/// Fields of unit lights over the samples (times area) and at the observations.
+struct Fields {
+    Eigen::MatrixXf source, local;
+};
+Fields light_fields(const Relief& relief, const ReliefSamples& samples,
+                    const ReliefObservations& observations, const std::vector<Vec3>& directions,
+                    const TranslucencyLightOptions& options) {
+    const auto count = static_cast<Index>(directions.size());
+    Fields fields{Eigen::MatrixXf(static_cast<Index>(samples.position.size()), count + 1),
+                  Eigen::MatrixXf(static_cast<Index>(observations.position.size()), count + 1)};
+    parallel_for(directions.size(), 1, [&](std::size_t l) {
+        const auto column = static_cast<Index>(l);
+        std::vector<float> seen, seen_local;
+        if (options.use_shadows) {
+            seen = visibility(relief, samples.position, samples.normal, directions[l]);
+            seen_local =
+                visibility(relief, observations.position, observations.normal, directions[l]);
+        }
+        for (std::size_t i = 0; i < samples.position.size(); ++i) {
+            fields.source(static_cast<Index>(i), column) =
+                static_cast<float>(
+                    entering_irradiance(samples.normal[i], directions[l], options.eta)) *
+                samples.area_px2[i] * (seen.empty() ? 1.0f : seen[i]);
+        }
+        for (std::size_t p = 0; p < observations.position.size(); ++p) {
+            fields.local(static_cast<Index>(p), column) =
+                static_cast<float>(
+                    entering_irradiance(observations.normal[p], directions[l], options.eta)) *
+                (seen_local.empty() ? 1.0f : seen_local[p]);
+        }
+    });
+    for (std::size_t i = 0; i < samples.position.size(); ++i)
+        fields.source(static_cast<Index>(i), count) = samples.area_px2[i];
+    fields.local.col(count).setOnes();
+    return fields;
+}
+
+/// Weighted ridge NNLS for one kernel's image of all lights.
+struct Fit {
+    VectorXd intensity;
+    double residual = 1e300;  ///< sum of squared weighted misfit
+};
+Fit fit_intensities(const MatrixXd& image, const VectorXd& y, const VectorXd& weight,
+                    const VectorXd& price) {
+    const MatrixXd a = weight.asDiagonal() * image;
+    const VectorXd b = weight.cwiseProduct(y);
+    const double scale = a.colwise().norm().mean();
+    MatrixXd gram = a.transpose() * a;
+    gram.diagonal() += (price * scale).cwiseAbs2();
+    Fit fit;
+    fit.intensity = solve_nnls_gram(gram, a.transpose() * b).x;
+    fit.residual = (a * fit.intensity - b).squaredNorm() +
+                   (price * scale).cwiseProduct(fit.intensity).squaredNorm();
+    return fit;
+}
+
+struct KernelChoice {
+    double g1 = 1, g2 = 1, mix = 1;
+};
+
+RadialKernel exponential(double g) {
+    return [g](double r) { return std::exp(-r / g) / (2 * kPi * g * g); };
+}
+
+/// Directions nearer than `merge_deg` to a stronger one join it, weighted by intensity.
+std::vector<ViewLight> merge_lights(const std::vector<Vec3>& directions, const VectorXd& intensity,
+                                    double merge_deg, int max_lights) {
+    std::vector<std::size_t> order;
+    for (std::size_t l = 0; l < directions.size(); ++l)
+        if (intensity[static_cast<Index>(l)] > 0) order.push_back(l);
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+        return intensity[static_cast<Index>(a)] > intensity[static_cast<Index>(b)];
+    });
+    struct Group {
+        Vec3 sum = Vec3::Zero();
+        double intensity = 0;
+    };
+    std::vector<Group> groups;
+    for (const std::size_t l : order) {
+        const double value = intensity[static_cast<Index>(l)];
+        Group* home = nullptr;
+        for (Group& group : groups) {
+            if (degrees(angle_between(group.sum, directions[l])) < merge_deg) {
+                home = &group;
+                break;
+            }
+        }
+        if (home == nullptr) {
+            groups.emplace_back();
+            home = &groups.back();
+        }
+        home->sum += value * directions[l];
+        home->intensity += value;
+    }
+    std::stable_sort(groups.begin(), groups.end(),
+                     [](const Group& a, const Group& b) { return a.intensity > b.intensity; });
+    std::vector<ViewLight> lights;
+    for (const Group& group : groups) {
+        if (static_cast<int>(lights.size()) == max_lights) break;
+        if (group.intensity < 0.02 * groups.front().intensity) break;
+        lights.push_back({group.sum.normalized(), Rgbd::Constant(group.intensity)});
+    }
+    return lights;
+}
+
+}  // namespace
+
+std::vector<Vec3> fibonacci_directions(int count, double z_min) {
+    std::vector<Vec3> directions;
+    const double golden = kPi * (3 - std::sqrt(5.0));
+    for (int i = 0; i < count; ++i) {
+        const double z = 1 - (1 - z_min) * (i + 0.5) / count;
+        const double rho = std::sqrt(std::max(0.0, 1 - z * z));
+        directions.emplace_back(rho * std::cos(golden * i), rho * std::sin(golden * i), z);
+    }
+    return directions;
+}
+
+std::vector<float> visibility(const Relief& relief, std::span<const Vec3f> positions,
+                              std::span<const Vec3f> normals, const Vec3& direction) {
+    const Vec3f w = direction.cast<float>();
+    const auto radius = static_cast<float>(relief.inradius_px);
+    const float step = std::max(1.0f, 0.05f * radius);
+    const float flat = std::hypot(w.x(), w.y());
+    std::vector<float> seen(positions.size(), 1.0f);
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+        if (normals[i].dot(w) <= 0) {
+            seen[i] = 0;
+            continue;
+        }
+        // Clear of the surface first: samples and depth differ by a cell.
+        const Vec3f start = positions[i] + 0.06f * radius * normals[i];
+        for (int k = 1; k < 200; ++k) {
+            const Vec3f p = start + (static_cast<float>(k) * step / std::max(flat, 0.2f)) * w;
+            if (std::abs(p.z()) > 1.6f * radius) break;
+            const int x = static_cast<int>(std::lround(p.x()));
+            const int y = static_cast<int>(std::lround(-p.y()));
+            if (!relief.mask.contains(x, y)) break;
+            if (is_inside(relief.mask, x, y) && std::abs(p.z()) < relief.depth_px(x, y)) {
+                seen[i] = 0;
+                break;
+            }
+        }
+    }
+    return seen;
+}
+
+ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const Relief& relief,
+                                                const Mask& excluded,
+                                                std::span<const ViewLight> highlight_lights,
+                                                const TranslucencyLightOptions& options,
+                                                const Progress& progress) {
+    ViewLightsEstimate result;
+    const double radius = relief.inradius_px;
+    const ReliefObservations observations =
+        draw_observations(relief, excluded, static_cast<std::size_t>(options.observation_count),
+                          2.0, 0.2, stream_key(options.seed, 0x11));
+    if (observations.pixel.size() < 50) {
+        result.lights.ambient = Rgbd::Constant(kPi);
+        result.outcome = Outcome::NotIdentifiable;
+        result.reason = "too little of the object is free of highlights and rim";
+        return result;
+    }
+    const VectorXd y = observed_exitance(diffuse, relief, observations, options.eta);
+    const VectorXd weight = y.cwiseMax(0.2).cwiseInverse();
+    const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
+
+    std::vector<Vec3> directions = fibonacci_directions(options.direction_count, -0.97);
+    const std::size_t first_highlight = directions.size();
+    for (std::size_t k = 0; k < std::min<std::size_t>(highlight_lights.size(), 4); ++k)
+        directions.push_back(highlight_lights[k].direction);
+    const auto count = static_cast<Index>(directions.size());
+
+    // Softness steers which kernels are tried and how dear ambient light is.
+    const double s = std::clamp(options.softness, 0.0, 1.0);
+    const double g_low = 0.02 * std::pow(4.0, s) * radius, g_high = 0.1 * std::pow(6.0, s) * radius;
+    VectorXd price(count + 1);
+    for (Index l = 0; l < count; ++l) {
+        const Vec3& w = directions[static_cast<std::size_t>(l)];
+        price[l] = options.direction_penalty * (1 + 3 * std::max(0.0, -w.z()));
+        if (static_cast<std::size_t>(l) >= first_highlight) price[l] *= options.highlight_discount;
+    }
+    price[count] = options.direction_penalty * std::pow(12.0, s);
+
+    const Fields fields = light_fields(relief, samples, observations, directions, options);
+    const DistanceHistogram histogram(observations, samples, fields.source, fields.local);
+    progress.update(0.4, "lights: light fields");
+
+    constexpr int kWidths = 5;
+    std::vector<double> widths;
+    std::vector<MatrixXd> images;
+    for (int i = 0; i < kWidths; ++i) {
+        widths.push_back(g_low * std::pow(g_high / g_low, static_cast<double>(i) / (kWidths - 1)));
+        images.push_back(histogram.image_of(exponential(widths.back())));
+    }
+    std::vector<KernelChoice> choices;
+    for (int i = 0; i < kWidths; ++i) {
+        choices.push_back({static_cast<double>(i), static_cast<double>(i), 1.0});
+        for (int j = i + 1; j < kWidths; ++j)
+            for (const double mix : {0.3, 0.6})
+                choices.push_back({static_cast<double>(i), static_cast<double>(j), mix});
+    }
+    const auto mixed = [&](const KernelChoice& choice) -> MatrixXd {
+        return choice.mix * images[static_cast<std::size_t>(choice.g1)] +
+               (1 - choice.mix) * images[static_cast<std::size_t>(choice.g2)];
+    };
+    std::vector<Fit> fits(choices.size());
+    parallel_for(choices.size(), 1, [&](std::size_t k) {
+        fits[k] = fit_intensities(mixed(choices[k]), y, weight, price);
+    });
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < fits.size(); ++k)
+        if (fits[k].residual < fits[best].residual) best = k;
+    progress.update(0.8, "lights: kernels");
+
+    const KernelChoice& choice = choices[best];
+    const double w1 = widths[static_cast<std::size_t>(choice.g1)];
+    const double w2 = widths[static_cast<std::size_t>(choice.g2)];
+    result.kernel_px = 2 * (choice.mix * w1 + (1 - choice.mix) * w2);
+    result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
+                                        options.merge_deg, options.max_lights);
+
+    // Intensities again, for the few that are left.
+    std::vector<Vec3> few;
+    for (const ViewLight& light : result.lights.lights) few.push_back(light.direction);
+    VectorXd few_price(static_cast<Index>(few.size()) + 1);
+    for (std::size_t l = 0; l < few.size(); ++l) {
+        few_price[static_cast<Index>(l)] =
+            options.direction_penalty * (1 + 3 * std::max(0.0, -few[l].z())) * 0.3;
+    }
+    few_price[static_cast<Index>(few.size())] = price[count];
+    const Fields few_fields = light_fields(relief, samples, observations, few, options);
+    const DistanceHistogram few_histogram(observations, samples, few_fields.source,
+                                          few_fields.local);
+    const MatrixXd few_image = choice.mix * few_histogram.image_of(exponential(w1)) +
+                               (1 - choice.mix) * few_histogram.image_of(exponential(w2));
+    const Fit final_fit = fit_intensities(few_image, y, weight, few_price);
+    std::vector<ViewLight> kept;
+    for (std::size_t l = 0; l < few.size(); ++l) {
+        const double value = final_fit.intensity[static_cast<Index>(l)];
+        if (value > 0) kept.push_back({few[l], Rgbd::Constant(value)});
+    }
+    std::stable_sort(kept.begin(), kept.end(), [](const ViewLight& a, const ViewLight& b) {
+        return a.intensity[0] > b.intensity[0];
+    });
+    result.lights.lights = std::move(kept);
+    result.lights.ambient = Rgbd::Constant(final_fit.intensity[static_cast<Index>(few.size())]);
+    const VectorXd misfit = weight.cwiseProduct(few_image * final_fit.intensity - y);
+    result.relative_residual = std::sqrt(misfit.squaredNorm() / static_cast<double>(misfit.size()));
+    const double total = result.lights.total();
+    if (total <= 0) {
+        result.lights.ambient = Rgbd::Constant(kPi);
+        result.outcome = Outcome::NotIdentifiable;
+        result.reason = "no light explains the picture";
+        return result;
+    }
+    result.ambient_share = luminance(result.lights.ambient) / total;
+    normalise_lights(result.lights, relief, options.eta);
+    if (result.relative_residual > 0.25) {
+        result.outcome = Outcome::Ambiguous;
+        result.reason = "the lighting could not be explained well";
+        result.warnings.push_back(
+            fmt::format("The lighting could not be explained: the best model is off by {:.0f} %.",
+                        100 * result.relative_residual));
+    }
+    if (result.ambient_share > 0.6) {
+        result.warnings.push_back(
+            "Flat light: most of it comes from everywhere, so how translucent the material is "
+            "stays uncertain.");
+    }
+    return result;
+}
+
+}  // namespace vitrine

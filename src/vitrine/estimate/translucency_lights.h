@@ -1,0 +1,61 @@
+// estimate/translucency_lights.h: the lights behind the diffuse shading of a translucent object.
+#pragma once
+
+#include "base/progress.h"
+#include "estimate/estimate.h"
+#include "scene/relief.h"
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace vitrine {
+
+struct TranslucencyLightOptions {
+    /// Who is soft? 1: the material (kernels of 0.08 to 0.6 inradii, little ambient light), as
+    /// suits a material photo; 0: the light (0.02 to 0.1), as suits an object photo. One
+    /// photograph cannot tell.
+    double softness = 1.0;
+    double eta = 1.3;
+    int direction_count = 96;         ///< Fibonacci directions with z > -0.97
+    int observation_count = 500;      ///< pixels compared
+    int samples_per_side = 1600;      ///< of the surface
+    double direction_penalty = 0.02;  ///< quadratic price of a light; back lights pay up to 4 times
+    double highlight_discount = 0.3;  ///< factor on the price of directions seen as highlights
+    double merge_deg = 40.0;          ///< lights closer than this become one
+    int max_lights = 3;
+    bool use_shadows = true;  ///< the object's own cast shadows
+    std::uint64_t seed = 1;   ///< of the choice of pixels
+};
+
+struct ViewLightsEstimate {
+    ViewLights lights;             ///< white, strongest first, normalised (scene/relief.h)
+    double relative_residual = 0;  ///< rms of (model - picture) / picture, weighted
+    double kernel_px = 0;          ///< mean radius of the kernel that explained the picture best
+    double ambient_share = 0;      ///< of all light
+    Outcome outcome = Outcome::Converged;
+    std::string reason;
+    std::vector<std::string> warnings;  ///< plain sentences
+};
+
+/// Non-negative least squares over a sphere of lights, each imaged through scattering kernels.
+///
+/// For a fixed kernel the picture is linear in the lights; kernels K = m k(g1) + (1 - m) k(g2),
+/// k(g) exponential in r / g, are tried on a grid and the best explained picture wins. Directions
+/// are then merged and intensities solved again. Replaces Lopez-Moreno et al. 2010, which assumes
+/// Lambertian shading and fails on translucent things: light from behind reads as ambient there.
+/// Costs about 0.5 s. `excluded`: highlights.
+ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const Relief& relief,
+                                                const Mask& excluded,
+                                                std::span<const ViewLight> highlight_lights,
+                                                const TranslucencyLightOptions& options = {},
+                                                const Progress& progress = {});
+
+/// Directions spread evenly over the sphere (Fibonacci lattice) with z > z_min.
+std::vector<Vec3> fibonacci_directions(int count, double z_min);
+
+/// 1 where `sample` sees the light, 0 where the (mirrored) object itself is in the way.
+std::vector<float> visibility(const Relief& relief, std::span<const Vec3f> positions,
+                              std::span<const Vec3f> normals, const Vec3& direction);
+
+}  // namespace vitrine
