@@ -19,6 +19,7 @@ namespace {
 
 std::atomic<int> received_signal{0};
 int exit_code = kDone;
+std::vector<std::string> words;
 
 /// A stage that is deep in an outside library cannot look at the flag: two seconds after the signal
 /// the process ends all the same. Files are replaced by rename, so none is half written.
@@ -103,6 +104,8 @@ void on_run(CLI::App& command, std::shared_ptr<CommonOptions> common, std::funct
     });
 }
 
+const std::vector<std::string>& command_line() { return words; }
+
 std::string resolved_options(const CLI::App& command) { return options_as_json(command); }
 
 Progress make_progress(const CommonOptions& common, const std::string& stage) {
@@ -139,8 +142,9 @@ int run_main(int argc, char** argv, const std::function<void(CLI::App&)>& add_co
     root.set_version_flag("--version", VITRINE_VERSION);
     root.set_help_all_flag("--help-all", "Help of all commands");
     try {
+        words.assign(argv + 1, argv + argc);
         add_commands(root);
-        std::vector<std::string> arguments = expand_config({argv + 1, argv + argc});
+        std::vector<std::string> arguments = expand_config(words);
         std::reverse(arguments.begin(), arguments.end());  // CLI11 takes them from the back
         root.parse(arguments);
         return exit_code;

@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace vitrine::cli {
 
@@ -48,6 +49,9 @@ Progress make_progress(const CommonOptions& common, const std::string& stage);
 
 /// Options of `command` as given or by default, as JSON text, for run.json.
 std::string resolved_options(const CLI::App& command);
+
+/// The words of this run, without the program's name.
+const std::vector<std::string>& command_line();
 
 /// Runs main's table; catches every exception once and turns it into an exit code.
 int run_main(int argc, char** argv, const std::function<void(CLI::App&)>& add_commands);

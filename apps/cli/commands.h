@@ -6,5 +6,6 @@
 namespace vitrine::cli {
 
 void add_check_command(CLI::App& root);
+void add_evaluate_command(CLI::App& root);
 
 }  // namespace vitrine::cli
