@@ -1,0 +1,176 @@
+#include "perception/threshold.h"
+
+#include "base/error.h"
+#include "perception/observer_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+namespace {
+
+double cube_above(double t, double knot) {
+    const double d = std::max(0.0, t - knot);
+    return d * d * d;
+}
+
+/// Knots at equal steps through the stimuli, so that each piece holds as many of them.
+std::vector<double> knots_through(std::span<const double> stimuli, int degrees_of_freedom) {
+    const double begin = stimuli.front(), span = stimuli.back() - stimuli.front();
+    std::vector<double> knots;
+    for (int k = 0; k <= degrees_of_freedom; ++k) {
+        const double at =
+            static_cast<double>(k) / degrees_of_freedom * static_cast<double>(stimuli.size() - 1);
+        const auto i = std::min(static_cast<std::size_t>(at), stimuli.size() - 2);
+        const double f = at - static_cast<double>(i);
+        knots.push_back(((1 - f) * stimuli[i] + f * stimuli[i + 1] - begin) / span);
+    }
+    return knots;
+}
+
+}  // namespace
+
+SmoothScale::SmoothScale(double begin, double end, std::vector<double> knots)
+    : begin_(begin), end_(end), knots_(std::move(knots)) {
+    VITRINE_CHECK_GE(knots_.size(), std::size_t{2});
+    coefficients = Eigen::VectorXd::Zero(degrees_of_freedom());
+}
+
+Eigen::VectorXd SmoothScale::basis(double n) const {
+    // Hastie, Tibshirani, Friedman 2009, eq. 5.4 and 5.5: N_1 = t, N_{k+1} = d_k - d_{K-1}. Beyond
+    // the last knot the cubes cancel to a straight line.
+    const double t = (n - begin_) / (end_ - begin_);
+    const std::size_t last = knots_.size() - 1;
+    Eigen::VectorXd values(degrees_of_freedom());
+    values[0] = t;
+    if (values.size() == 1) return values;
+    const auto d = [&](std::size_t k) {
+        return (cube_above(t, knots_[k]) - cube_above(t, knots_[last])) /
+               (knots_[last] - knots_[k]);
+    };
+    const double d_last = d(last - 1);
+    for (std::size_t k = 0; k + 1 < last; ++k) {
+        values[static_cast<Eigen::Index>(k) + 1] = d(k) - d_last;
+    }
+    return values;
+}
+
+double SmoothScale::beta(double n) const {
+    // The dot product of `basis` without its storage: this is the inner loop of a bootstrap.
+    const double t = (n - begin_) / (end_ - begin_);
+    const std::size_t last = knots_.size() - 1;
+    double sum = coefficients[0] * t;
+    if (last == 1) return sum;
+    const double cube_last = cube_above(t, knots_[last]);
+    const double d_last =
+        (cube_above(t, knots_[last - 1]) - cube_last) / (knots_[last] - knots_[last - 1]);
+    for (std::size_t k = 0; k + 1 < last; ++k) {
+        const double d = (cube_above(t, knots_[k]) - cube_last) / (knots_[last] - knots_[k]);
+        sum += coefficients[static_cast<Eigen::Index>(k) + 1] * (d - d_last);
+    }
+    return sum;
+}
+
+SmoothFitter::SmoothFitter(const QuestionCells& cells, std::span<const double> stimuli,
+                           const SmoothOptions& options)
+    : answers_(cells.data.answers), answer_count_(cells.data.answers.sum()), lapse_(options.lapse) {
+    VITRINE_CHECK_EQ(static_cast<int>(stimuli.size()), cells.stimulus_count);
+    const int most = std::min(options.max_degrees_of_freedom, cells.stimulus_count - 2);
+    for (int df = 1; df <= std::max(1, most); ++df) {
+        SmoothScale candidate(stimuli.front(), stimuli.back(), knots_through(stimuli, df));
+        Eigen::MatrixXd at_stimuli(cells.stimulus_count - 1, df);
+        const Eigen::VectorXd origin = candidate.basis(stimuli.front());
+        for (int i = 1; i < cells.stimulus_count; ++i) {
+            at_stimuli.row(i - 1) =
+                (candidate.basis(stimuli[static_cast<std::size_t>(i)]) - origin).transpose();
+        }
+        designs_.push_back(cells.data.design * at_stimuli);
+        candidates_.push_back(std::move(candidate));
+    }
+}
+
+SmoothScale SmoothFitter::fit(const Eigen::VectorXd& ones) const {
+    const SmoothScale* best = nullptr;
+    const std::vector<SmoothScale> fitted = fit_all(ones);
+    for (const SmoothScale& scale : fitted) {
+        // A fit that did not settle is no evidence for a curve.
+        if (!best || (scale.has_converged && scale.bic < best->bic)) best = &scale;
+    }
+    return *best;
+}
+
+std::vector<SmoothScale> SmoothFitter::fit_all(const Eigen::VectorXd& ones) const {
+    // A ridge far below the information of one answer keeps separated replicates finite.
+    constexpr double kRidge = 1e-6;
+    std::vector<SmoothScale> fitted = candidates_;
+    BinomialData data;
+    data.answers = answers_;
+    data.ones = ones;
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+        SmoothScale& scale = fitted[i];
+        data.design = designs_[i];
+        const ProbitFit fit = fit_probit(
+            data, {.lapse = lapse_, .ridge = kRidge, .max_iterations = 40, .tolerance = 1e-7},
+            &candidates_[i].coefficients);
+        scale.coefficients = fit.beta;
+        scale.log_likelihood = fit.log_likelihood;
+        scale.has_converged = fit.has_converged;
+        scale.bic = -2 * fit.log_likelihood +
+                    scale.degrees_of_freedom() * std::log(std::max(1.0, answer_count_));
+    }
+    return fitted;
+}
+
+void SmoothFitter::start_from(const Eigen::VectorXd& ones) {
+    const std::vector<SmoothScale> fitted = fit_all(ones);
+    for (std::size_t i = 0; i < fitted.size(); ++i) {
+        if (fitted[i].has_converged) candidates_[i].coefficients = fitted[i].coefficients;
+    }
+}
+
+const Eigen::MatrixXd& SmoothFitter::design(const SmoothScale& scale) const {
+    return designs_[static_cast<std::size_t>(scale.degrees_of_freedom()) - 1];
+}
+
+std::vector<double> SmoothFitter::probabilities(const SmoothScale& scale) const {
+    const Eigen::VectorXd eta = design(scale) * scale.coefficients;
+    std::vector<double> p;
+    for (const double e : eta) p.push_back(probability_of_one(e, lapse_));
+    return p;
+}
+
+double local_threshold(const SmoothScale& scale, double n) {
+    const double span = scale.end() - scale.begin();
+    if (scale.degrees_of_freedom() == 1) {
+        const double slope = scale.coefficients[0] / span;
+        return slope > kBetaPerThreshold / (4 * span) ? kBetaPerThreshold / slope : kNoThreshold;
+    }
+    const auto rise = [&](double width) {
+        return scale.beta(n + width / 2) - scale.beta(n - width / 2);
+    };
+    constexpr int kSteps = 160;
+    double low = 0.0, high = 0.0;
+    for (int i = 1; i <= kSteps; ++i) {
+        high = 4 * span * i / kSteps;
+        if (rise(high) >= kBetaPerThreshold) break;
+        if (i == kSteps) return kNoThreshold;
+        low = high;
+    }
+    for (int i = 0; i < 30; ++i) {
+        const double middle = 0.5 * (low + high);
+        (rise(middle) >= kBetaPerThreshold ? high : low) = middle;
+    }
+    return 0.5 * (low + high);
+}
+
+Threshold threshold_of(const SmoothScale& scale, std::span<const double> stimuli) {
+    Threshold threshold;
+    for (const double n : stimuli) {
+        const double local = local_threshold(scale, n);
+        threshold.local.push_back({n, local});
+        threshold.value = std::min(threshold.value, local);
+    }
+    return threshold;
+}
+
+}  // namespace vitrine
