@@ -1,0 +1,64 @@
+// estimate/light_search.h: from 36 candidates on a hemisphere to continuous lights. Internal to
+// estimate/lights.
+#pragma once
+
+#include "base/progress.h"
+#include "estimate/light_fit.h"
+
+#include <span>
+#include <vector>
+
+namespace vitrine {
+
+/// A light as seen from the reference point, aimed at it.
+struct PolarLight {
+    Vec3 direction = Vec3(0, 0, 1);  ///< unit, toward the light
+    double distance_m = 1.0;
+    double radius_m = 0.04;
+    double weight = 1.0;  ///< relative intensity; the first light has 1
+};
+
+struct LightSet {
+    std::vector<PolarLight> lights;
+    LightScore score;
+};
+
+struct HemisphereGrid {
+    std::vector<Vec3> directions;
+    std::vector<double> distances_m;
+};
+/// `count` nearly even directions above the plane; distances around the scene's diameter.
+HemisphereGrid make_hemisphere(const ScanSamples& samples, int count);
+
+TrialLight to_trial(const PolarLight& light, const Vec3& reference_point_m);
+LightColumns columns_of(const LightFit& fit, std::span<const PolarLight> lights, int disc_samples,
+                        int stride);
+
+/// Scores every grid light alone; best first.
+std::vector<LightSet> search_single(const LightFit& fit, const HemisphereGrid& grid, int stride);
+
+/// Scores the grid as a second light beside each of `firsts`; best first.
+std::vector<LightSet> search_pairs(const LightFit& fit, const HemisphereGrid& grid,
+                                   std::span<const LightSet> firsts, int stride);
+
+struct RefineOptions {
+    int stride = 1;
+    int disc_samples = 16;
+    int max_evaluations = 120;
+    double step_rad = 0.1;  ///< first simplex
+    bool refine_radius = true;
+    bool keep_geometry = false;  ///< only weights
+};
+/// Simplex search over direction, log distance, log radius and weight of all lights together.
+LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineOptions& options);
+
+struct LightDeviation {
+    double direction_rad = 0.0;  ///< root of the mean variance of the two angles
+    double log_distance = 0.0;
+    bool is_identifiable = false;  ///< the cost curves upward in both angles
+};
+/// Standard deviations of light `k` from block sums of the loss (sandwich estimator, the limit of
+/// a block bootstrap with many resamples), by differences over about one degree.
+LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k);
+
+}  // namespace vitrine

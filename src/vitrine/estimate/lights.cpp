@@ -1,0 +1,286 @@
+#include "estimate/lights.h"
+
+#include "base/log.h"
+#include "estimate/light_search.h"
+#include "math/optimise.h"
+#include "math/statistics.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+constexpr int kScoutStride = 3;     // one third of the samples finds the basin
+constexpr std::size_t kStarts = 4;  // grid lights that are refined
+constexpr int kMinSamples = 200;
+// A second light must explain this share of what one leaves (by evidence, see docs/estimation.md).
+constexpr double kSecondLightGain = 0.18;
+constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are texture
+constexpr double kMinSeparationRad = 0.436;
+// Block sums see noise and texture, not the model's own error (bounced light of 96 rays, disc of
+// uniform emission, a mesh 1 mm off): the share found by comparing with known lights.
+constexpr double kModelDeviationRad = 0.006;
+constexpr double kModelLogDistance = 0.02;
+
+struct Masks {
+    std::uint32_t opaque = kScanMask, see_through = 0;
+};
+
+Masks masks_of(const EstimationScene& scene, const std::vector<ObjectClass>& classes) {
+    Masks masks;
+    for (int k = 0; k < scene.object_count(); ++k) {
+        const auto index = static_cast<std::size_t>(k);
+        const ObjectClass c = index < classes.size() ? classes[index] : ObjectClass::Unsure;
+        const bool is_opaque = c == ObjectClass::Specular || c == ObjectClass::Diffuse;
+        (is_opaque ? masks.opaque : masks.see_through) |= object_mask(k);
+    }
+    masks.see_through &= ~masks.opaque;
+    return masks;
+}
+
+std::optional<ReferenceSample> find_reference(const EstimationScene& scene,
+                                              const FrameLookup& lookup,
+                                              const std::optional<ReferenceAlbedo>& reference) {
+    if (!reference) return std::nullopt;
+    for (std::size_t f = 0; f < lookup.frames().size(); ++f) {
+        const RgbdFrame& frame = lookup.frames()[f];
+        if (frame.id != reference->frame) continue;
+        const Camera& camera = lookup.cameras()[f];
+        const Vec3f origin = camera.centre_in_world().cast<float>();
+        const Vec3f direction =
+            camera.ray_in_world(reference->pixel.x(), reference->pixel.y()).cast<float>();
+        const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, kAllMask});
+        if (!hit.is_hit() || scene.object_of_part(hit.part) >= 0) return std::nullopt;
+        ReferenceSample sample;
+        const Mesh& mesh = scene.mesh(hit.part);
+        sample.point = {hit_point(mesh, hit), shading_normal(mesh, hit)};
+        sample.albedo = reference->albedo;
+        for (int c = 0; c < 3; ++c) {
+            std::vector<double> patch;
+            for (int dy = -2; dy <= 2; ++dy)
+                for (int dx = -2; dx <= 2; ++dx)
+                    patch.push_back(
+                        frame.colour.clamped(static_cast<int>(reference->pixel.x()) + dx,
+                                             static_cast<int>(reference->pixel.y()) + dy)[c]);
+            sample.radiance[c] = static_cast<float>(median(patch));
+        }
+        return sample;
+    }
+    return std::nullopt;
+}
+
+LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEstimate& estimate,
+                     const Progress& progress) {
+    const HemisphereGrid grid = make_hemisphere(fit.samples(), options.candidate_count);
+    const std::vector<LightSet> singles = search_single(fit, grid, kScoutStride);
+    estimate.error_initial = singles.front().score.cost;
+    estimate.grid_direction = singles.front().lights[0].direction;
+    progress.update(0.3, "refining the light");
+
+    const RefineOptions scout{.stride = kScoutStride,
+                              .disc_samples = 8,
+                              .max_evaluations = 70,
+                              .step_rad = 0.12,
+                              .refine_radius = false};
+    std::vector<LightSet> refined;
+    for (std::size_t i = 0; i < std::min(kStarts, singles.size()); ++i)
+        refined.push_back(refine_lights(fit, singles[i], scout));
+    std::stable_sort(refined.begin(), refined.end(), [](const LightSet& a, const LightSet& b) {
+        return a.score.cost < b.score.cost;
+    });
+    const RefineOptions fine{
+        .stride = 1, .disc_samples = 16, .max_evaluations = 140, .step_rad = 0.04};
+    LightSet best = refine_lights(fit, refined.front(), fine);
+    progress.update(0.6, "looking for a second light");
+
+    for (int count = 2; count <= options.max_lights; ++count) {
+        std::vector<LightSet> firsts = {best};
+        firsts.insert(
+            firsts.end(), singles.begin(),
+            singles.begin() + static_cast<long>(std::min<std::size_t>(6, singles.size())));
+        std::vector<LightSet> pairs = search_pairs(fit, grid, firsts, kScoutStride);
+        RefineOptions pair_scout = scout;
+        pair_scout.max_evaluations = 150;
+        LightSet best_pair;
+        best_pair.score.cost = 2.0;
+        for (std::size_t i = 0; i < std::min<std::size_t>(3, pairs.size()); ++i) {
+            LightSet pair = refine_lights(fit, pairs[i], pair_scout);
+            if (pair.score.cost < best_pair.score.cost) best_pair = pair;
+        }
+        if (best_pair.lights.empty()) break;
+        const LightScore one =
+            fit.score(columns_of(fit, best.lights, 8, kScoutStride), kScoutStride, kLuminance);
+        log_debug("lights: {} cost {:.4f}, {} cost {:.4f}", count - 1, one.cost, count,
+                  best_pair.score.cost);
+        if (best_pair.score.cost > (1.0 - kSecondLightGain) * one.cost) break;
+        RefineOptions pair_fine = fine;
+        pair_fine.max_evaluations = 260;
+        best_pair = refine_lights(fit, best_pair, pair_fine);
+        double total = 0.0, least = 1e30;
+        for (const PolarLight& light : best_pair.lights) {
+            const double e = light.weight / (light.distance_m * light.distance_m);
+            total += e;
+            least = std::min(least, e);
+        }
+        const PolarLight& last = best_pair.lights.back();
+        bool is_apart = true;
+        for (std::size_t i = 0; i + 1 < best_pair.lights.size(); ++i)
+            is_apart &=
+                angle_between(best_pair.lights[i].direction, last.direction) > kMinSeparationRad;
+        if (least < kMinSecondShare * total || !is_apart) break;
+        best = best_pair;
+    }
+    return best;
+}
+
+/// Strength per channel: ambient ratio, scale and, with several lights, their shares.
+void fit_channels(const LightFit& fit, const LightSet& set, LightEstimate& estimate) {
+    constexpr int kDiscSamples = 32;
+    std::vector<DirectColumn> columns;
+    for (const PolarLight& light : set.lights)
+        columns.push_back(
+            fit.column(to_trial(light, fit.samples().reference_point), kDiscSamples, 1));
+    for (int channel = 0; channel < 3; ++channel) {
+        const auto combined = [&](const std::vector<double>& log_share) {
+            LightColumns sum;
+            for (std::size_t k = 0; k < columns.size(); ++k)
+                sum.add(columns[k],
+                        set.lights[k].weight * (k == 0 ? 1.0 : std::exp(log_share[k - 1])));
+            return sum;
+        };
+        std::vector<double> share(columns.size() - 1, 0.0);
+        if (!share.empty()) {
+            const MinimumNd best = minimise_nelder_mead(
+                [&](const std::vector<double>& x) {
+                    return fit.score(combined(x), 1, channel).cost;
+                },
+                share, std::vector<double>(share.size(), 0.1), {.max_evaluations = 40});
+            share = best.x;
+        }
+        const LightScore score = fit.score(combined(share), 1, channel);
+        for (std::size_t k = 0; k < columns.size(); ++k)
+            estimate.lights[k].light.intensity_w_per_sr[channel] = static_cast<float>(
+                score.intensity * set.lights[k].weight * (k == 0 ? 1.0 : std::exp(share[k - 1])));
+        estimate.ambient_radiance[channel] =
+            static_cast<float>(score.ambient_ratio * score.intensity);
+    }
+}
+
+LightSet from_lights(const std::vector<DiscLight>& lights, const Vec3& reference) {
+    LightSet set;
+    for (const DiscLight& light : lights) {
+        const Vec3 d = light.position_m - reference;
+        const double strength = luminance(light.intensity_w_per_sr);
+        const double first = luminance(lights.front().intensity_w_per_sr);
+        set.lights.push_back({d.normalized(), d.norm(), std::max(light.radius_m, 1e-3),
+                              first > 0 ? strength / first : 1.0});
+    }
+    return set;
+}
+
+}  // namespace
+
+LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> frames,
+                              double saturation_level, const LightOptions& options,
+                              const Progress& progress) {
+    LightEstimate estimate;
+    const EstimationScene world(scene);
+    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
+    const Masks masks = masks_of(world, options.object_classes);
+    const std::vector<Rgb> object_radiance = mean_object_radiance(world, lookup);
+    const ScanSamples samples =
+        sample_scan(world, lookup, masks.see_through, object_radiance, options.samples);
+    estimate.reference_point_m = samples.reference_point;
+    estimate.scene_radius_m = samples.scene_radius_m;
+    estimate.plane = samples.plane;
+    estimate.albedo_anchor = "mean_albedo";
+    if (samples.saturated_count > samples.tried_count / 2) {
+        estimate.reason = "most of the scan is clipped in every picture: expose for the table";
+        return estimate;
+    }
+    if (static_cast<int>(samples.points.size()) < kMinSamples) {
+        estimate.reason = "too few scanned points are seen without occlusion";
+        return estimate;
+    }
+    const std::optional<ReferenceSample> reference =
+        find_reference(world, lookup, options.reference_albedo);
+    if (reference) estimate.albedo_anchor = "reference_albedo";
+    const LightFit fit(world, samples, reference, masks.opaque, masks.see_through, options.seed);
+    progress.update(0.15, "searching the hemisphere");
+
+    LightSet set;
+    std::vector<DiscLight> known;
+    for (const Light& light : options.known_lights) {
+        if (const auto* disc = std::get_if<DiscLight>(&light)) {
+            known.push_back(*disc);
+        } else if (const auto* point = std::get_if<PointLight>(&light)) {
+            known.push_back({point->position_m,
+                             (samples.reference_point - point->position_m).normalized(), 1e-3,
+                             point->intensity_w_per_sr});
+        }
+    }
+    if (!known.empty()) {
+        set = refine_lights(fit, from_lights(known, samples.reference_point),
+                            {.max_evaluations = 60, .keep_geometry = true});
+    } else if (options.start && !options.start->empty()) {
+        set = refine_lights(fit, from_lights(*options.start, samples.reference_point),
+                            {.max_evaluations = 160, .step_rad = 0.03});
+    } else {
+        set = find_lights(fit, options, estimate, progress);
+    }
+    progress.update(0.85, "strength and doubt of the lights");
+
+    estimate.error_refined = set.score.cost;
+    estimate.residual_rms = set.score.residual_rms;
+    estimate.outcome = Outcome::Converged;
+    for (std::size_t k = 0; k < set.lights.size(); ++k) {
+        const PolarLight& polar = set.lights[k];
+        FittedLight fitted;
+        const TrialLight trial = to_trial(polar, samples.reference_point);
+        fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
+        const LightDeviation deviation = light_deviation(fit, set, k);
+        fitted.stddev_direction_deg =
+            degrees(std::hypot(deviation.direction_rad, kModelDeviationRad));
+        fitted.stddev_distance_m =
+            polar.distance_m * std::hypot(deviation.log_distance, kModelLogDistance);
+        fitted.outcome = Outcome::Converged;
+        if (!deviation.is_identifiable || fitted.stddev_direction_deg > 15.0) {
+            fitted.outcome = Outcome::NotIdentifiable;
+            fitted.reason = "no shadow or second surface tells where this light stands";
+        }
+        fitted.is_distant =
+            deviation.log_distance > 0.35 || polar.distance_m > 10.0 * samples.scene_radius_m;
+        if (fitted.outcome != Outcome::Converged) {
+            estimate.outcome = fitted.outcome;
+            estimate.reason = fitted.reason;
+        }
+        estimate.lights.push_back(fitted);
+    }
+    fit_channels(fit, set, estimate);
+    progress.update(1.0);
+    return estimate;
+}
+
+double elevation_deg(const LightEstimate& estimate, const Vec3& light_position_m) {
+    const Vec3 d = (light_position_m - estimate.reference_point_m).normalized();
+    return degrees(std::asin(std::clamp(d.dot(estimate.plane.normal), -1.0, 1.0)));
+}
+
+std::vector<Light> to_lights(const LightEstimate& estimate) {
+    std::vector<Light> lights;
+    for (const FittedLight& fitted : estimate.lights) {
+        if (fitted.is_distant) {
+            const Vec3 d = estimate.reference_point_m - fitted.light.position_m;
+            lights.push_back(DirectionalLight{
+                d.normalized(),
+                fitted.light.intensity_w_per_sr / static_cast<float>(d.squaredNorm())});
+        } else {
+            lights.push_back(fitted.light);
+        }
+    }
+    return lights;
+}
+
+}  // namespace vitrine

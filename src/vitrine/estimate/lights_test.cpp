@@ -1,0 +1,144 @@
+#include "estimate/lights.h"
+
+#include "base/parallel.h"
+#include "estimate/light_search.h"
+#include "geometry/primitives.h"
+
+#include <gtest/gtest.h>
+
+namespace vitrine {
+namespace {
+
+/// A table with two boxes, photographed from eight sides under `lights`, without bounces: the
+/// same direct model that is fitted, so recovery must be nearly exact.
+struct World {
+    Scene scene;
+    std::vector<RgbdFrame> frames;
+};
+
+World make_world(const std::vector<DiscLight>& lights, float ambient, float clip = 1e9f) {
+    World world;
+    Mesh scan = make_plane(1.2, 0.0, 120);
+    std::vector<Rgb> albedo(scan.vertices.size(), Rgb(0.4f, 0.35f, 0.3f));
+    for (const auto& [centre, colour] :
+         {std::pair{Vec3(0.12, 0.1, 0.05), Rgb(0.7f, 0.3f, 0.1f)},
+          std::pair{Vec3(-0.15, -0.05, 0.05), Rgb(0.2f, 0.3f, 0.6f)}}) {
+        append(scan, make_box(Vec3(0.08, 0.08, 0.1), centre));
+        albedo.resize(scan.vertices.size(), colour);
+    }
+    scan.colours.assign(scan.vertices.size(), Rgb::Zero());
+    Part part;
+    part.name = "scan";
+    Diffuse diffuse;
+    diffuse.use_vertex_colours = true;
+    part.material = diffuse;
+    part.mesh = std::make_shared<const Mesh>(scan);
+    world.scene.parts.push_back(part);
+    for (int k = 0; k < 8; ++k) {
+        const double angle = 2.0 * kPi * k / 8.0;
+        Camera camera;
+        camera.width = 160;
+        camera.height = 120;
+        camera.fx = camera.fy = 150;
+        camera.cx = 79.5;
+        camera.cy = 59.5;
+        camera.cam_from_world = look_at(Vec3(0.6 * std::cos(angle), 0.6 * std::sin(angle), 0.5),
+                                        Vec3::Zero(), Vec3(0, 0, 1))
+                                    .inverse();
+        world.scene.cameras.push_back(camera);
+    }
+    const EstimationScene estimation(world.scene);
+    for (const Camera& camera : world.scene.cameras) {
+        RgbdFrame frame;
+        frame.id = std::to_string(world.frames.size());
+        frame.camera = camera;
+        frame.colour = ImageRgb(camera.width, camera.height);
+        std::vector<SurfacePoint> points;
+        std::vector<std::pair<int, int>> pixels;
+        std::vector<Rgb> colours;
+        const Vec3f origin = camera.centre_in_world().cast<float>();
+        for (int v = 0; v < camera.height; ++v)
+            for (int u = 0; u < camera.width; ++u) {
+                const Hit hit = estimation.accel().closest(
+                    {origin, camera.ray_in_world(u, v).cast<float>(), 0.0f, 1e30f, kAllMask});
+                if (!hit.is_hit()) continue;
+                const Triangle& t = scan.triangles[static_cast<std::size_t>(hit.triangle)];
+                points.push_back({hit_point(scan, hit), hit.normal});
+                colours.push_back(albedo[static_cast<std::size_t>(t[0])]);
+                pixels.emplace_back(u, v);
+            }
+        std::vector<Rgb> irradiance(points.size(), Rgb::Zero());
+        for (const DiscLight& light : lights) {
+            const DirectColumn column =
+                direct_column(estimation, points, {light.position_m, light.normal, light.radius_m},
+                              64, kScanMask, 0);
+            for (std::size_t i = 0; i < points.size(); ++i)
+                irradiance[i] += column.clear[i] * light.intensity_w_per_sr;
+        }
+        const GatheredLight gathered = gather_light(estimation, points, 64, 0, {}, 7);
+        for (std::size_t i = 0; i < points.size(); ++i)
+            frame.colour(pixels[i].first, pixels[i].second) =
+                (colours[i] / kPif * (irradiance[i] + ambient * gathered.openness[i])).min(clip);
+        world.frames.push_back(std::move(frame));
+    }
+    return world;
+}
+
+DiscLight aimed(const Vec3& position, double radius_m, float intensity) {
+    return {position, -position.normalized(), radius_m, Rgb::Constant(intensity)};
+}
+
+double error_deg(const FittedLight& fitted, const Vec3& position) {
+    return degrees(angle_between(fitted.light.position_m, position));
+}
+
+LightOptions small_options() {
+    LightOptions options;
+    options.samples.count = 2000;
+    options.samples.gather_rays = 32;
+    return options;
+}
+
+TEST(EstimateLights, RecoversOneLampUnderAmbient) {
+    const Vec3 position(0.45, -0.35, 0.6);
+    const World world = make_world({aimed(position, 0.04, 3.0f)}, 0.05f);
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, small_options());
+    ASSERT_EQ(e.lights.size(), 1u);
+    EXPECT_EQ(e.outcome, Outcome::Converged);
+    EXPECT_LT(error_deg(e.lights[0], position), 1.0);
+    EXPECT_NEAR(e.lights[0].light.position_m.norm(), position.norm(), 0.08 * position.norm());
+    EXPECT_LT(e.lights[0].stddev_direction_deg, 2.0);
+}
+
+TEST(EstimateLights, TellsTwoLampsFromOne) {
+    const Vec3 a(0.45, -0.35, 0.6), b(-0.6, -0.2, 0.7);
+    const World world = make_world({aimed(a, 0.03, 3.0f), aimed(b, 0.03, 1.8f)}, 0.0f);
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, small_options());
+    ASSERT_EQ(e.lights.size(), 2u);
+    const bool is_a_first = error_deg(e.lights[0], a) < error_deg(e.lights[0], b);
+    EXPECT_LT(error_deg(e.lights[is_a_first ? 0 : 1], a), 2.0);
+    EXPECT_LT(error_deg(e.lights[is_a_first ? 1 : 0], b), 2.0);
+}
+
+TEST(EstimateLights, SaysWhenEverythingIsClipped) {
+    const World world = make_world({aimed(Vec3(0.4, 0.3, 0.6), 0.04, 3.0f)}, 0.05f, 0.02f);
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 0.02, small_options());
+    EXPECT_EQ(e.outcome, Outcome::NotIdentifiable);
+    EXPECT_FALSE(e.reason.empty());
+}
+
+TEST(EstimateLights, SameBitsForAnyThreadCount) {
+    const World world = make_world({aimed(Vec3(0.45, -0.35, 0.6), 0.04, 3.0f)}, 0.05f);
+    LightOptions options = small_options();
+    options.samples.count = 600;
+    options.max_lights = 1;
+    const LightEstimate a = estimate_lights(world.scene, world.frames, 1e9, options);
+    set_thread_count(1);
+    const LightEstimate b = estimate_lights(world.scene, world.frames, 1e9, options);
+    set_thread_count(0);
+    EXPECT_EQ(a.lights[0].light.position_m, b.lights[0].light.position_m);
+    EXPECT_TRUE((a.ambient_radiance == b.ambient_radiance).all());
+}
+
+}  // namespace
+}  // namespace vitrine

@@ -1,0 +1,38 @@
+// render/estimation_refraction.h: one ray through one clear object, for trial indices.
+#pragma once
+
+#include "render/estimation_scene.h"
+
+namespace vitrine {
+
+/// The strongest way of a ray through a solid dielectric: refracted in, totally reflected as often
+/// as Snell asks, refracted out. Weaker branches (internal reflection below the critical angle,
+/// at most a few percent at each surface) are left out.
+struct RefractedPath {
+    bool is_valid = false;  ///< entered and left again
+    Vec3f entry = Vec3f::Zero();
+    Vec3f entry_normal = Vec3f::Zero();
+    float entry_reflectance = 0.0f;
+    Vec3f exit = Vec3f::Zero();
+    Vec3f exit_direction = Vec3f::Zero();
+    float transmittance = 0.0f;  ///< product of Fresnel transmittances, no absorption
+    float length_m = 0.0f;       ///< inside, for exp(-sigma_a length)
+    int internal_reflections = 0;
+};
+
+constexpr int kMaxInternalReflections = 6;
+
+/// Traces `direction` (unit) from `origin` outside of `object`; other parts are not looked at.
+RefractedPath refract_through(const EstimationScene& scene, int object, const Vec3f& origin,
+                              const Vec3f& direction, float ior);
+
+/// The way straight through a thin-walled vessel: no bending, a slab's loss at each wall.
+/// @param wall_m thickness of each wall, for the length inside the glass
+RefractedPath pass_through_shell(const EstimationScene& scene, int object, const Vec3f& origin,
+                                 const Vec3f& direction, float ior, float wall_m);
+
+/// First hit of the scan from an exit point. The search starts `back_m` before it: a hull that
+/// stands on a rough table may end a little below it.
+Hit scan_behind(const EstimationScene& scene, const RefractedPath& path, float back_m);
+
+}  // namespace vitrine
