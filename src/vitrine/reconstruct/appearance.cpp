@@ -19,30 +19,6 @@ float median_of(std::array<float, kMaxViews>& values, std::size_t count) {
     return 0.5f * (*middle + *std::max_element(values.begin(), middle));
 }
 
-/// Fills vertices without colour from their neighbours, ring by ring.
-void spread_colours(const Mesh& mesh, std::vector<Rgb>& colours, std::vector<std::uint8_t> known) {
-    for (int ring = 0; ring < 200; ++ring) {
-        std::vector<Rgb> sum(colours.size(), Rgb::Zero());
-        std::vector<int> count(colours.size(), 0);
-        for (const Triangle& t : mesh.triangles) {
-            for (int k = 0; k < 3; ++k) {
-                const auto a = static_cast<std::size_t>(t[k]);
-                const auto b = static_cast<std::size_t>(t[(k + 1) % 3]);
-                if (known[a] && !known[b]) sum[b] += colours[a], ++count[b];
-                if (known[b] && !known[a]) sum[a] += colours[b], ++count[a];
-            }
-        }
-        bool has_changed = false;
-        for (std::size_t i = 0; i < colours.size(); ++i) {
-            if (count[i] == 0) continue;
-            colours[i] = sum[i] / static_cast<float>(count[i]);
-            known[i] = 1;
-            has_changed = true;
-        }
-        if (!has_changed) return;
-    }
-}
-
 }  // namespace
 
 bool median_colour(const Vec3& point, const Vec3& normal, std::span<const ViewOfScene> views,
@@ -70,6 +46,29 @@ bool median_colour(const Vec3& point, const Vec3& normal, std::span<const ViewOf
     if (count < std::max<std::size_t>(1, min_views)) return false;
     for (int k = 0; k < 3; ++k) colour[k] = median_of(values[static_cast<std::size_t>(k)], count);
     return true;
+}
+
+void spread_colours(const Mesh& mesh, std::vector<Rgb>& colours, std::vector<std::uint8_t> known) {
+    for (int ring = 0; ring < 200; ++ring) {
+        std::vector<Rgb> sum(colours.size(), Rgb::Zero());
+        std::vector<int> count(colours.size(), 0);
+        for (const Triangle& t : mesh.triangles) {
+            for (int k = 0; k < 3; ++k) {
+                const auto a = static_cast<std::size_t>(t[k]);
+                const auto b = static_cast<std::size_t>(t[(k + 1) % 3]);
+                if (known[a] && !known[b]) sum[b] += colours[a], ++count[b];
+                if (known[b] && !known[a]) sum[a] += colours[b], ++count[a];
+            }
+        }
+        bool has_changed = false;
+        for (std::size_t i = 0; i < colours.size(); ++i) {
+            if (count[i] == 0) continue;
+            colours[i] = sum[i] / static_cast<float>(count[i]);
+            known[i] = 1;
+            has_changed = true;
+        }
+        if (!has_changed) return;
+    }
 }
 
 std::vector<Rgb> vertex_colours(const Mesh& mesh, std::span<const ViewOfScene> views) {

@@ -23,6 +23,10 @@ struct ViewOfScene {
 bool median_colour(const Vec3& point, const Vec3& normal, std::span<const ViewOfScene> views,
                    std::size_t min_views, Rgb& colour);
 
+/// Gives vertices with `known` = 0 the mean colour of their neighbours, ring by ring from outside
+/// in.
+void spread_colours(const Mesh& mesh, std::vector<Rgb>& colours, std::vector<std::uint8_t> known);
+
 /// Vertex colours by `median_colour`; vertices seen by no view take the mean of their neighbours.
 /// Cost: about 0.2 us a vertex and view.
 std::vector<Rgb> vertex_colours(const Mesh& mesh, std::span<const ViewOfScene> views);

@@ -2,8 +2,10 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "image/filter.h"
 #include "math/statistics.h"
 #include "reconstruct/appearance.h"
+#include "reconstruct/depth_classes.h"
 #include "reconstruct/fusion.h"
 #include "trace/depth_map.h"
 
@@ -12,10 +14,31 @@
 namespace vitrine {
 namespace {
 
+constexpr int kBadMargin_px = 3;  // silhouettes are a little wider than their bad depth
+
 std::vector<ImageF> depth_images(const Capture& capture) {
     std::vector<ImageF> depth;
     for (const RgbdFrame& frame : capture.frames) depth.push_back(frame.depth_m);
     return depth;
+}
+
+/// Fuses, then leaves out the regions where depth is missing or disagrees with what was fused, and
+/// fuses again: readings through glass and on metal pull the surfaces around them along.
+Mesh fuse_twice(const std::vector<ImageF>& depth, const std::vector<Camera>& cameras,
+                const FusionOptions& options) {
+    const auto first = std::make_shared<const Mesh>(fuse_depth(depth, cameras, options));
+    if (first->empty()) return {};
+    const Accel accel(std::vector<AccelPart>{{first}});
+    std::vector<ImageF> trusted = depth;
+    for (std::size_t i = 0; i < depth.size(); ++i) {
+        const ImageF model = render_depth(accel, cameras[i]);
+        const Mask bad =
+            bad_regions(classify_depth(depth[i], model, cameras[i], options.max_depth_m));
+        for (std::size_t p = 0; p < bad.size(); ++p) {
+            if (bad[p] > 127) trusted[i][p] = 0.0f;
+        }
+    }
+    return fuse_depth(trusted, cameras, options);
 }
 
 /// The plane that most depth pixels lie on, its normal towards the cameras.
@@ -79,18 +102,25 @@ Scan make_scan(const Capture& capture, const ScanOptions& options, const Progres
     const FusionOptions fusion{options.voxel_m, options.truncation_m, options.max_depth_m};
     const std::vector<ImageF> depth = depth_images(capture);
     scan.mesh =
-        without_small_pieces(fuse_depth(depth, scan.cameras, fusion), options.min_component_m2);
+        without_small_pieces(fuse_twice(depth, scan.cameras, fusion), options.min_component_m2);
     scan.support_plane = find_support_plane(capture, scan.cameras, options.max_depth_m);
     scan.mesh.normals = vertex_normals(scan.mesh);
     progress.update(0.6, "rendering the surface");
-    const Accel accel({{std::make_shared<const Mesh>(scan.mesh)}});
+    const Accel accel(std::vector<AccelPart>{{std::make_shared<const Mesh>(scan.mesh)}});
     std::vector<ImageF> model;
     for (const Camera& camera : scan.cameras) model.push_back(render_depth(accel, camera));
     scan.depth_residual_m = depth_residual(capture, model, scan.poses);
     progress.update(0.8, "colouring the surface");
+    // What stands before the surface without being in it (glass, metal) must not colour it.
+    std::vector<Mask> excluded;
     std::vector<ViewOfScene> views;
     for (std::size_t i = 0; i < model.size(); ++i) {
-        views.push_back({&capture.frames[i], &scan.cameras[i], &model[i], nullptr});
+        excluded.push_back(dilate(
+            bad_regions(classify_depth(depth[i], model[i], scan.cameras[i], options.max_depth_m)),
+            kBadMargin_px));
+    }
+    for (std::size_t i = 0; i < model.size(); ++i) {
+        views.push_back({&capture.frames[i], &scan.cameras[i], &model[i], &excluded[i]});
     }
     scan.mesh.colours = vertex_colours(scan.mesh, views);
     log_info("scan: {} vertices, depth residual {:.2f} mm", scan.mesh.vertices.size(),

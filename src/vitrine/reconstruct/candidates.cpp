@@ -1,0 +1,253 @@
+#include "reconstruct/candidates.h"
+
+#include "base/log.h"
+#include "image/filter.h"
+#include "reconstruct/candidate_views.h"
+#include "reconstruct/visual_hull.h"
+#include "reconstruct/vote_grid.h"
+#include "trace/depth_map.h"
+
+#include <algorithm>
+
+namespace vitrine {
+namespace {
+
+constexpr double kGrowth_m = 0.010;  // the first guess of a body may be this much too small
+constexpr double kMargin_m = 0.025;  // of the carved box around the voted voxels
+constexpr double kMaxVoxels = 4e7;   // of the voting grid: 160 MB
+constexpr double kMaxBase_m = 0.03;  // objects stand on the plane; what floats is no object
+constexpr double kMaxDepth_m = 2.0;
+constexpr int kOccupiedMargin_px = 5;  // blur and misregistration beside an object
+constexpr int kBoxMargin_px = 25;      // of background around an object, to learn from
+
+/// Everything about one object while it takes shape.
+struct Growing {
+    VoxelCluster cluster;
+    ScalarGrid body;                ///< negative inside
+    std::vector<BodyImage> images;  ///< of the body, per view
+    std::vector<SilhouetteView> views;
+    std::vector<Mask> silhouettes;
+    std::vector<OutlineView> outlines;
+};
+
+Box3 grown(const Box3& box, double by) {
+    Box3 result = box;
+    result.min.array() -= by;
+    result.max.array() += by;
+    return result;
+}
+
+/// Space above the support surface where objects can stand.
+Box3 workspace(const SupportSurface& support, double max_height_m) {
+    Box3 box;
+    const Rigid3 world_from_plane = support.plane_from_world.inverse();
+    for (int y = 0; y < support.rows; ++y) {
+        for (int x = 0; x < support.columns; ++x) {
+            if (!support.is_filled[static_cast<std::size_t>(y * support.columns + x)]) continue;
+            const Vec3 p(support.origin.x() + x * support.cell_m,
+                         support.origin.y() + y * support.cell_m, 0);
+            box.extend(world_from_plane * p);
+            box.extend(world_from_plane * (p + Vec3(0, 0, max_height_m)));
+        }
+    }
+    return box;
+}
+
+Votes vote(const SceneViews& views, const CandidateOptions& options) {
+    std::vector<Mask> bad, known;
+    for (const DepthClasses& classes : views.classes) {
+        bad.push_back(bad_regions(classes));
+        Mask can_tell = bad.back();
+        for (std::size_t p = 0; p < can_tell.size(); ++p) {
+            if (classes[p] == DepthClass::Ok) can_tell[p] = 255;
+        }
+        known.push_back(std::move(can_tell));
+    }
+    std::vector<VoteView> votes;
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        votes.push_back({&views.scan->cameras[i], &views.capture->frames[i].depth_m,
+                         &views.background_depth_m[i], &bad[i], &known[i]});
+    }
+    const Box3 box = workspace(views.support, options.max_height_m);
+    if (box.is_empty()) return {};
+    const double voxel = std::max(options.voxel_m, std::cbrt(box.size().prod() / kMaxVoxels));
+    return vote_for_bad_depth(
+        votes, box, views.scan->support_plane,
+        {voxel, options.min_bad_fraction, std::min<int>(options.min_views, int(views.count())),
+         options.min_volume_m3});
+}
+
+double base_height(const VoxelCluster& cluster, const Plane& support) {
+    double lowest = 1e9;
+    for (int c = 0; c < 8; ++c) {
+        Vec3 corner;
+        for (int k = 0; k < 3; ++k) corner[k] = (c >> k & 1 ? cluster.box.max : cluster.box.min)[k];
+        lowest = std::min(lowest, support.height(corner));
+    }
+    return lowest;
+}
+
+/// The voted voxels as a smooth field, negative inside.
+ScalarGrid body_of_cluster(const ScalarGrid& grid, const VoxelCluster& cluster) {
+    ScalarGrid body(grown(cluster.box, kMargin_m), grid.spacing_m, 1.0f);
+    for (const std::size_t node : cluster.nodes) {
+        const Eigen::Vector3i c = grid.node_of(node);
+        const Vec3 at = (grid.node(c.x(), c.y(), c.z()) - body.origin) / body.spacing_m;
+        body.at(int(std::lround(at.x())), int(std::lround(at.y())), int(std::lround(at.z()))) =
+            -1.0f;
+    }
+    ScalarGrid smooth = gaussian_blur(body, 1.0);
+    // Scaled to metres near the surface, so that offsets mean something.
+    for (float& v : smooth.values) v *= static_cast<float>(1.5 * body.spacing_m);
+    return smooth;
+}
+
+void render(const SceneViews& views, double growth_m, Growing& object) {
+    const Plane& support = views.scan->support_plane;
+    object.images = render_body(views, hull_mesh(object.body, 0.0, 0.0, support),
+                                hull_mesh(object.body, -growth_m, 0.0, support));
+}
+
+/// A nearer candidate hides a farther one.
+void hide_behind_each_other(std::vector<Growing>& objects) {
+    for (std::size_t a = 0; a < objects.size(); ++a) {
+        for (std::size_t i = 0; i < objects[a].images.size(); ++i) {
+            BodyImage& image = objects[a].images[i];
+            if (image.expected.empty()) continue;
+            for (std::size_t b = 0; b < objects.size(); ++b) {
+                if (a == b || objects[b].images[i].expected.empty()) continue;
+                const ImageF& other = objects[b].images[i].depth_m;
+                for (std::size_t p = 0; p < other.size(); ++p) {
+                    if (other[p] <= 0) continue;
+                    if (image.depth_m[p] <= 0 || image.depth_m[p] <= other[p]) continue;
+                    image.hidden[p] = 255;
+                    image.expected[p] = 0;
+                }
+            }
+        }
+    }
+}
+
+std::vector<Mask> occupied_pixels(const std::vector<Growing>& objects, std::size_t view_count) {
+    std::vector<Mask> occupied(view_count);
+    for (std::size_t i = 0; i < view_count; ++i) {
+        for (const Growing& object : objects) {
+            const ImageF& depth = object.images[i].depth_m;
+            if (occupied[i].empty()) occupied[i] = Mask(depth.width(), depth.height());
+            for (std::size_t p = 0; p < depth.size(); ++p) {
+                if (depth[p] > 0) occupied[i][p] = 255;
+            }
+        }
+        occupied[i] = dilate(occupied[i], kOccupiedMargin_px);
+    }
+    return occupied;
+}
+
+void look_behind(const SceneViews& views, std::vector<Growing>& objects) {
+    const std::vector<Mask> occupied = occupied_pixels(objects, views.count());
+    for (Growing& object : objects) {
+        object.views.resize(views.count());
+        for (std::size_t i = 0; i < views.count(); ++i) {
+            SilhouetteView& view = object.views[i];
+            view.colour = &views.capture->frames[i].colour;
+            view.classes = &views.classes[i];
+            const BodyImage& image = object.images[i];
+            if (image.expected.empty()) continue;
+            view.box = PixelBox::of(image.expected)
+                           .grown(kBoxMargin_px, view.colour->width(), view.colour->height());
+            predict_background(views, occupied, i, view.box, view.background, view.has_background);
+        }
+    }
+}
+
+void draw_outlines(const SceneViews& views, double slack_px, Growing& object) {
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        SilhouetteView& view = object.views[i];
+        view.expected = view.box.is_empty() ? Mask() : object.images[i].expected;
+        view.hidden = object.images[i].hidden;
+    }
+    object.silhouettes = cut_silhouettes(object.views, views.capture->saturation_level,
+                                         {.outline_slack_px = slack_px});
+}
+
+void carve_body(const SceneViews& views, double spacing_m, Growing& object) {
+    object.outlines.clear();
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        object.outlines.push_back(
+            outline_view(views.scan->cameras[i], object.silhouettes[i], object.images[i].hidden));
+    }
+    object.body = carve(object.outlines, grown(object.cluster.box, kMargin_m), spacing_m);
+}
+
+Candidate finish(const SceneViews& views, const Growing& object) {
+    Candidate candidate;
+    candidate.hull = hull_mesh(object.body, 0.0, 1.0, views.scan->support_plane);
+    candidate.box = bounds(candidate.hull);
+    candidate.silhouettes = object.silhouettes;
+    std::size_t bad = 0, all = 0;
+    for (std::size_t i = 0; i < views.count(); ++i) {
+        candidate.hidden.push_back(object.images[i].hidden);
+        const Mask& mask = object.silhouettes[i];
+        for (std::size_t p = 0; p < mask.size(); ++p) {
+            if (mask[p] < 128) continue;
+            ++all;
+            bad += is_bad(views.classes[i][p]) ? 1 : 0;
+        }
+    }
+    candidate.bad_depth_fraction = all > 0 ? double(bad) / double(all) : 0.0;
+    return candidate;
+}
+
+}  // namespace
+
+Candidates find_candidates(const Capture& capture, const Scan& scan,
+                           const CandidateOptions& options, const Progress& progress) {
+    VITRINE_CHECK_EQ(capture.frames.size(), scan.cameras.size());
+    Candidates result;
+    progress.update(0.0, "voting for bad depth");
+    SceneViews views = make_scene_views(capture, scan, {}, kMaxDepth_m);
+    const Votes votes = vote(views, options);
+    std::vector<Growing> objects;
+    std::vector<Box3> bodies;
+    for (const VoxelCluster& cluster : votes.clusters) {
+        if (base_height(cluster, scan.support_plane) > kMaxBase_m) continue;
+        Growing object;
+        object.cluster = cluster;
+        object.body = body_of_cluster(votes.fraction, cluster);
+        bodies.push_back(grown(cluster.box, kGrowth_m));
+        objects.push_back(std::move(object));
+    }
+    if (objects.empty()) {
+        result.notes.push_back("no region where depth is missing or wrong in several views");
+        return result;
+    }
+    views = make_scene_views(capture, scan, bodies, kMaxDepth_m);
+    for (Growing& object : objects) render(views, kGrowth_m, object);
+    hide_behind_each_other(objects);
+    progress.update(0.3, "predicting what is behind the candidates");
+    look_behind(views, objects);
+    for (int round = 0; round < options.rounds; ++round) {
+        progress.update(0.5 + 0.4 * round / options.rounds, "drawing outlines");
+        for (Growing& object : objects) {
+            draw_outlines(views, round == 0 ? 10.0 : 6.0, object);
+            const bool is_last = round + 1 == options.rounds;
+            carve_body(views, is_last ? options.hull_spacing_m : 0.003, object);
+            render(views, kGrowth_m, object);
+        }
+        hide_behind_each_other(objects);
+    }
+    for (Growing& object : objects) {
+        Candidate candidate = finish(views, object);
+        if (!candidate.hull.empty()) result.objects.push_back(std::move(candidate));
+    }
+    std::stable_sort(
+        result.objects.begin(), result.objects.end(),
+        [](const Candidate& a, const Candidate& b) { return volume(a.hull) > volume(b.hull); });
+    for (std::size_t i = 0; i < result.objects.size(); ++i) {
+        result.objects[i].id = fmt::format("object_{}", i);
+    }
+    progress.update(1.0, "candidates done");
+    return result;
+}
+
+}  // namespace vitrine
