@@ -160,11 +160,18 @@ void look_behind(const SceneViews& views, std::vector<Growing>& objects) {
     }
 }
 
-void draw_outlines(const SceneViews& views, double slack_px, Growing& object) {
+void draw_outlines(const SceneViews& views, const std::vector<Growing>& all, double slack_px,
+                   Growing& object) {
     for (std::size_t i = 0; i < views.count(); ++i) {
         SilhouetteView& view = object.views[i];
         view.expected = view.box.is_empty() ? Mask() : object.images[i].expected;
         view.hidden = object.images[i].hidden;
+        view.other = Mask();
+        for (const Growing& other : all) {
+            if (&other == &object || other.images[i].expected.empty()) continue;
+            view.other = view.other.empty() ? other.images[i].expected
+                                            : mask_or(view.other, other.images[i].expected);
+        }
     }
     object.silhouettes = cut_silhouettes(object.views, views.capture->saturation_level,
                                          {.outline_slack_px = slack_px});
@@ -229,7 +236,7 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
     for (int round = 0; round < options.rounds; ++round) {
         progress.update(0.5 + 0.4 * round / options.rounds, "drawing outlines");
         for (Growing& object : objects) {
-            draw_outlines(views, round == 0 ? 10.0 : 6.0, object);
+            draw_outlines(views, objects, round == 0 ? 10.0 : 6.0, object);
             const bool is_last = round + 1 == options.rounds;
             carve_body(views, is_last ? options.hull_spacing_m : 0.003, object);
             render(views, kGrowth_m, object);

@@ -69,13 +69,17 @@ std::size_t colour_bin(const Rgb& linear, double saturation_level) {
     return bin;
 }
 
+bool is_other(const SilhouetteView& view, int x, int y) {
+    return is_inside(view.other, x, y) && !is_inside(view.expected, x, y);
+}
+
 Cues learn(std::span<const SilhouetteView> views, double saturation_level) {
     Cues cues;
     for (const SilhouetteView& view : views) {
         if (view.expected.empty()) continue;
         for (int y = view.box.y0; y < view.box.y1; ++y) {
             for (int x = view.box.x0; x < view.box.x1; ++x) {
-                if (is_inside(view.hidden, x, y)) continue;
+                if (is_inside(view.hidden, x, y) || is_other(view, x, y)) continue;
                 const bool inside = is_inside(view.expected, x, y);
                 cues.depth.add(static_cast<std::size_t>((*view.classes)(x, y)), inside);
                 cues.difference.add(difference_bin(view, x, y), inside);
@@ -116,9 +120,11 @@ Mask cut_one(const SilhouetteView& view, const Cues& cues, double saturation_lev
             const Rgb here = encoded((*view.colour)(px, py));
             double evidence = 0;
             if (!is_inside(view.hidden, px, py)) {
-                evidence = cues.depth[static_cast<std::size_t>((*view.classes)(px, py))] +
-                           cues.difference[difference_bin(view, px, py)] +
-                           0.5 * cues.colour[colour_bin((*view.colour)(px, py), saturation_level)];
+                evidence = 0.5 * cues.colour[colour_bin((*view.colour)(px, py), saturation_level)];
+                if (!is_other(view, px, py)) {
+                    evidence += cues.depth[static_cast<std::size_t>((*view.classes)(px, py))] +
+                                cues.difference[difference_bin(view, px, py)];
+                }
             }
             // Near the expected outline the pixels decide; far from it the expectation does.
             const double away = outline(px, py) / options.outline_slack_px;

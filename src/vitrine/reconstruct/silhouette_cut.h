@@ -29,9 +29,10 @@ struct SilhouetteView {
     const DepthClasses* classes = nullptr;
     ImageRgb background;  ///< predicted from other views inside `box`
     Mask has_background;
-    Mask expected;          ///< where the object is thought to be; empty image: not seen
-    Mask hidden;            ///< something nearer stands before the object
-    PixelBox box;           ///< all that is looked at
+    Mask expected;  ///< where the object is thought to be; empty image: not seen
+    Mask hidden;    ///< something nearer stands before the object
+    Mask other;     ///< another candidate is expected there: it explains bad depth; may be empty
+    PixelBox box;   ///< all that is looked at
     bool is_fixed = false;  ///< edited by the user: learn from it, leave it
 };
 
