@@ -2,7 +2,7 @@
 
 #include "base/error.h"
 #include "base/text.h"
-#include "geometry/mesh_io.h"
+#include "scene/virtual_object.h"
 #include "trace/accel.h"
 
 #include <algorithm>
@@ -11,8 +11,7 @@ namespace vitrine {
 namespace {
 
 constexpr double kFlatEnough_deg =
-    30.0;                             // scans of tables are rarely off by more than a few degrees
-constexpr double kCrease_deg = 35.0;  // keeps the edges of boxes, rounds facets of curved meshes
+    30.0;  // scans of tables are rarely off by more than a few degrees
 
 }  // namespace
 
@@ -58,24 +57,20 @@ Insertion place_on_surface(const std::filesystem::path& mesh_file, const Placeme
     if (normal.dot(ray) > 0) normal = -normal;
     const Vec3 axis = angle_between(normal, up) < radians(kFlatEnough_deg) ? up : normal;
 
-    Mesh mesh = read_mesh(mesh_file);
-    const Box3 box = bounds(mesh);
+    Insertion insertion;
+    const std::vector<VirtualMesh> meshes = read_virtual_meshes(mesh_file, insertion.notes);
+    Box3 box;
+    for (const VirtualMesh& virtual_mesh : meshes) {
+        box.extend(bounds(virtual_mesh.mesh).min);
+        box.extend(bounds(virtual_mesh.mesh).max);
+    }
     const Vec3 foot(box.centre().x(), box.centre().y(), box.min.z());
     Mat4 world_from_mesh = Mat4::Identity();
     world_from_mesh.topLeftCorner<3, 3>() =
         Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis).toRotationMatrix();
     world_from_mesh.topRightCorner<3, 1>() = point - world_from_mesh.topLeftCorner<3, 3>() * foot;
-    mesh = transformed(mesh, world_from_mesh);
-    if (mesh.normals.empty()) mesh = with_creased_normals(welded(mesh, 1e-7), kCrease_deg);
-
-    Part part;
-    part.name = "virtual_0";
-    part.is_virtual = true;
-    part.mesh_file = mesh_file.filename().string();
-    part.mesh = std::make_shared<Mesh>(std::move(mesh));
-    part.material = Diffuse{Rgb::Constant(0.7f), nullptr, "", false};
-    Insertion insertion;
-    insertion.objects.push_back(std::move(part));
+    insertion.objects =
+        make_virtual_parts(meshes, mesh_file, world_from_mesh, std::nullopt, 0, insertion.notes);
     insertion.frames = {placement.frame};
     return insertion;
 }

@@ -1,7 +1,7 @@
 #include "scene/insertion.h"
 
-#include "geometry/mesh_io.h"
 #include "scene/scene_json.h"
+#include "scene/virtual_object.h"
 
 namespace vitrine {
 
@@ -11,19 +11,17 @@ Insertion read_insertion(const std::filesystem::path& path) {
     const std::filesystem::path folder = path.parent_path();
     Insertion insertion;
     for (const JsonObject& item : object.objects("objects")) {
-        Part part;
-        part.name = fmt::format("virtual_{}", insertion.objects.size());
-        part.is_virtual = true;
-        part.mesh_file = item.text("mesh");
-        Mesh mesh = read_mesh(resolve_inside(item, "mesh", folder));
-        if (item.has("to_world")) mesh = transformed(mesh, read_matrix(item, "to_world"));
-        part.material = item.has("material") ? read_material(item.object("material"), folder)
-                                             : Material(Diffuse{});
-        // A crease of 35 degrees keeps the edges of boxes and rounds the facets of curved meshes.
-        if (mesh.normals.empty()) mesh = with_creased_normals(welded(mesh, 1e-7), 35.0);
-        part.mesh = std::make_shared<Mesh>(std::move(mesh));
+        const std::filesystem::path file = resolve_inside(item, "mesh", folder);
+        const Mat4 world_from_mesh =
+            item.has("to_world") ? read_matrix(item, "to_world") : Mat4(Mat4::Identity());
+        std::optional<Material> material;
+        if (item.has("material")) material = read_material(item.object("material"), folder);
         item.finish();
-        insertion.objects.push_back(std::move(part));
+        for (Part& part :
+             make_virtual_parts(read_virtual_meshes(file, insertion.notes), file, world_from_mesh,
+                                material, insertion.objects.size(), insertion.notes)) {
+            insertion.objects.push_back(std::move(part));
+        }
     }
     if (insertion.objects.empty()) object.fail("objects", "at least one object", "none");
     if (object.has("frames")) {

@@ -12,11 +12,11 @@
 namespace vitrine {
 
 struct Relief {
-    Mask mask;               ///< 255 where there is an object
-    ImageF depth_px;         ///< height above the silhouette plane z = 0; 0 outside
-    Image<Vec3f> normals;    ///< unit, viewer frame; (0, 0, 1) outside
+    Mask mask;                  ///< 255 where there is an object
+    ImageF depth_px;            ///< height above the silhouette plane z = 0; 0 outside
+    Image<Vec3f> normals;       ///< unit, viewer frame; (0, 0, 1) outside
     Image<Vec3f> base_normals;  ///< of the smooth base without shading detail; empty: use `normals`
-    double inradius_px = 0;  ///< of the mask: the unit of every length parameter
+    double inradius_px = 0;     ///< of the mask: the unit of every length parameter
 
     Vec3f point(int x, int y) const {
         return {static_cast<float>(x), static_cast<float>(-y), depth_px(x, y)};

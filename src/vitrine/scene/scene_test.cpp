@@ -78,6 +78,15 @@ TEST_F(SceneFile, InsertionPlacesTheMesh) {
     EXPECT_LT((bounds(*insertion.objects[0].mesh).centre() - Vec3(1, 2, 3)).norm(), 1e-6);
     EXPECT_TRUE(insertion.objects[0].is_virtual);
     EXPECT_TRUE(insertion.frames.empty());
+    Mesh open = make_sphere(0.1, Vec3::Zero(), 8);
+    open.triangles.pop_back();
+    write_ply(folder_ / "hat.ply", open);
+    try {
+        read_insertion(folder_ / "i.json");
+        FAIL();
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("3 open"), std::string::npos) << error.what();
+    }
     write_text_file(folder_ / "j.json",
                     R"({"schema": "vitrine.insertion/1", "objects": [{"mesh": "gone.obj"}]})");
     EXPECT_THROW(read_insertion(folder_ / "j.json"), InputError);
