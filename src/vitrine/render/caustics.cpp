@@ -157,7 +157,7 @@ class Tracer {
     bool step(Flight& flight, const Hit& hit, const PathSampler& sampler, float initial,
               Flight* pending, int& pending_count, std::vector<Photon>& arrivals,
               std::uint32_t view, PhotonBalance& balance) const {
-        const SurfacePoint point = scene_.surface(hit, flight.direction);
+        const ShadingPoint point = scene_.surface(hit, flight.direction);
         absorb(flight, scene_.transmittance(flight.media, hit.distance), balance);
         const int depth = flight.depth++;
         if (scene_.dielectric(hit.part)) {
@@ -189,7 +189,7 @@ class Tracer {
         return scatter(flight, point, bsdf, depth, sampler, initial, balance);
     }
 
-    bool pass_interface(Flight& flight, const SurfacePoint& point, int depth,
+    bool pass_interface(Flight& flight, const ShadingPoint& point, int depth,
                         const PathSampler& sampler, float initial, Flight* pending,
                         int& pending_count, PhotonBalance& balance) const {
         const InterfaceEvent event = cross_interface(scene_, point, flight.direction, flight.media);
@@ -235,7 +235,7 @@ class Tracer {
         return survival >= 1 || gamble(flight, u < survival, survival, balance);
     }
 
-    bool scatter(Flight& flight, const SurfacePoint& point, const Bsdf& bsdf, int depth,
+    bool scatter(Flight& flight, const ShadingPoint& point, const Bsdf& bsdf, int depth,
                  const PathSampler& sampler, float initial, PhotonBalance& balance) const {
         const Frame frame(point.shading_normal);
         const Vec3f wo = frame.to_local(-flight.direction);

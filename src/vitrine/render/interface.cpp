@@ -4,7 +4,7 @@
 
 namespace vitrine {
 
-Vec3f mirror_direction(const SurfacePoint& point, const Vec3f& direction) {
+Vec3f mirror_direction(const ShadingPoint& point, const Vec3f& direction) {
     Vec3f reflected = reflect(-direction, point.shading_normal);
     if (reflected.dot(point.geometric_normal) <= 0) {
         reflected = reflect(-direction, point.geometric_normal);
@@ -12,7 +12,7 @@ Vec3f mirror_direction(const SurfacePoint& point, const Vec3f& direction) {
     return reflected.normalized();
 }
 
-InterfaceEvent cross_interface(const RenderScene& scene, const SurfacePoint& point,
+InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
                                const Vec3f& direction, const Media& media) {
     InterfaceEvent event;
     event.beyond = media;

@@ -16,10 +16,10 @@ struct InterfaceEvent {
 };
 
 /// @param direction unit, of travel; @param media on this side
-InterfaceEvent cross_interface(const RenderScene& scene, const SurfacePoint& point,
+InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
                                const Vec3f& direction, const Media& media);
 
 /// Mirror direction about the shading normal, kept above the geometric surface.
-Vec3f mirror_direction(const SurfacePoint& point, const Vec3f& direction);
+Vec3f mirror_direction(const ShadingPoint& point, const Vec3f& direction);
 
 }  // namespace vitrine

@@ -74,7 +74,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
         }
         result.is_touched |= scene_.is_virtual(hit.part);
         if (state.depth == 0) result.first_part = hit.part;
-        const SurfacePoint point = scene_.surface(hit, state.direction);
+        const ShadingPoint point = scene_.surface(hit, state.direction);
         ++state.depth;
         if (scene_.dielectric(hit.part)) {
             if (++state.specular_bounces > options_.max_specular_bounces) return;
@@ -156,7 +156,7 @@ bool PathTracer::is_hidden(const Ray& ray, std::uint32_t view, PathResult& resul
     return true;
 }
 
-void PathTracer::add_direct(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+void PathTracer::add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                             const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
                             std::uint32_t view, PathResult& result) const {
     const LightSampler& lights = scene_.lights();
@@ -201,7 +201,7 @@ void PathTracer::add_direct(const State& state, const SurfacePoint& point, const
     }
 }
 
-void PathTracer::add_caustics(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                               const Frame& frame, const Vec3f& wo, std::uint32_t view,
                               PathResult& result) const {
     if (!caustics_ || caustics_->empty()) return;
@@ -230,7 +230,7 @@ void PathTracer::add_caustics(const State& state, const SurfacePoint& point, con
     result.layers[static_cast<std::size_t>(layer)] += state.throughput * reflected;
 }
 
-bool PathTracer::scatter(State& state, const SurfacePoint& point, const Bsdf& bsdf,
+bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf,
                          const Frame& frame, const Vec3f& wo, const PathSampler& sampler) const {
     const BsdfSample s = sample(bsdf, wo, sampler.pair(state.depth, kScatterUse),
                                 sampler.number(state.depth, kLobeUse));
@@ -262,7 +262,7 @@ bool PathTracer::scatter(State& state, const SurfacePoint& point, const Bsdf& bs
     return true;
 }
 
-bool PathTracer::pass_interface(State& state, const SurfacePoint& point, Pending& pending,
+bool PathTracer::pass_interface(State& state, const ShadingPoint& point, Pending& pending,
                                 const PathSampler& sampler) const {
     const InterfaceEvent event = cross_interface(scene_, point, state.direction, state.media);
     State reflected = state, refracted = state;

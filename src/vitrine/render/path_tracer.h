@@ -55,15 +55,15 @@ class PathTracer {
                 PathResult& result) const;
     void add_emission(const State& state, float distance, PathResult& result) const;
     void add_environment(const State& state, PathResult& result) const;
-    void add_direct(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+    void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                     const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
                     std::uint32_t view, PathResult& result) const;
-    void add_caustics(const State& state, const SurfacePoint& point, const Bsdf& bsdf,
+    void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                       const Frame& frame, const Vec3f& wo, std::uint32_t view,
                       PathResult& result) const;
-    bool scatter(State& state, const SurfacePoint& point, const Bsdf& bsdf, const Frame& frame,
+    bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
-    bool pass_interface(State& state, const SurfacePoint& point, Pending& pending,
+    bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,
                         const PathSampler& sampler) const;
     bool is_hidden(const Ray& ray, std::uint32_t view, PathResult& result) const;
 

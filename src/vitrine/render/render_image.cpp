@@ -16,7 +16,7 @@ Geometry render_geometry(const RenderScene& scene, const Camera& camera, std::ui
             const Vec3f direction = camera.ray_in_world(x, y).cast<float>();
             const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, view});
             if (!hit.is_hit()) continue;
-            const SurfacePoint point = scene.surface(hit, direction);
+            const ShadingPoint point = scene.surface(hit, direction);
             geometry.z_m(x, y) = hit.distance * direction.dot(forward);
             geometry.normal(x, y) = point.shading_normal.array();
             geometry.albedo(x, y) = scene.diffuse_albedo(hit.part, hit);

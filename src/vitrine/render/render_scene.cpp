@@ -117,9 +117,9 @@ Rgb RenderScene::transmittance(const Media& media, float distance) const {
     return (-medium->sigma_a_per_m * distance).exp();
 }
 
-SurfacePoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {
+ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {
     const Mesh& mesh = *accel_.parts()[static_cast<std::size_t>(hit.part)].mesh;
-    SurfacePoint point;
+    ShadingPoint point;
     point.part = hit.part;
     point.distance = hit.distance;
     point.position = hit_point(mesh, hit);
@@ -161,7 +161,7 @@ Rgb RenderScene::diffuse_albedo(int part, const Hit& hit) const {
     return diffuse->albedo;
 }
 
-Bsdf RenderScene::bsdf(const SurfacePoint& point, const Hit& hit) const {
+Bsdf RenderScene::bsdf(const ShadingPoint& point, const Hit& hit) const {
     const Material& m = material(point.part);
     if (const auto* ward = std::get_if<Ward>(&m)) {
         return WardBsdf{ward->rho_d, ward->rho_s, static_cast<float>(ward->sigma_x),

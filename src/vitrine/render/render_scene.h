@@ -33,7 +33,7 @@ class Media {
 };
 
 /// A surface point that a ray has met, seen from where the ray came.
-struct SurfacePoint {
+struct ShadingPoint {
     int part = -1;
     float distance = 0.0f;
     Vec3f position = Vec3f::Zero();
@@ -75,20 +75,20 @@ class RenderScene {
     Rgb transmittance(const Media& media, float distance) const;
 
     /// The surface that `hit` of a ray found.
-    SurfacePoint surface(const Hit& hit, const Vec3f& ray_direction) const;
+    ShadingPoint surface(const Hit& hit, const Vec3f& ray_direction) const;
     /// Scattering of an opaque or mirror part at a point; dielectrics need the media and are not
     /// answered here.
-    Bsdf bsdf(const SurfacePoint& point, const Hit& hit) const;
+    Bsdf bsdf(const ShadingPoint& point, const Hit& hit) const;
     Rgb diffuse_albedo(int part, const Hit& hit) const;
 
     /// Start of a ray that leaves `point` towards `direction`, off the surface by epsilon.
-    Vec3f leave(const SurfacePoint& point, const Vec3f& direction) const {
+    Vec3f leave(const ShadingPoint& point, const Vec3f& direction) const {
         const float side = direction.dot(point.geometric_normal) < 0 ? -epsilon_ : epsilon_;
         return point.position + side * point.geometric_normal;
     }
     /// As `leave`, for the bright side of opaque surfaces: starts on the rounded surface that the
     /// shading normals describe, so that facets do not shade themselves at the terminator.
-    Vec3f leave_smooth(const SurfacePoint& point) const {
+    Vec3f leave_smooth(const ShadingPoint& point) const {
         return point.smooth_position + epsilon_ * point.geometric_normal;
     }
 
