@@ -16,18 +16,14 @@ namespace {
 constexpr double kPlaneAngle_deg = 35.0;  // flatter triangles near the plane are the plane
 constexpr double kHiddenBelow_m = 0.05;   // what shows just under a closed surface is noise
 constexpr double kMinPiece_m2 = 2e-4;     // crumbs that the cuts leave behind
-constexpr double kSamplesPerM2 = 1e6;     // of hulls: one a square millimetre
 
 /// Answers whether a point is inside a hull or near it.
 class NearHull {
   public:
     NearHull(const Mesh& hull, double margin_m)
-        : margin_(margin_m), accel_(std::vector<AccelPart>{{std::make_shared<const Mesh>(hull)}}) {
-        const auto count = static_cast<std::size_t>(surface_area(hull) * kSamplesPerM2) + 100;
-        for (const Vec3f& p : sample_surface(hull, count, 7).points) {
-            cells_[cell(p)].push_back(p);
-            box_.extend(p.cast<double>());
-        }
+        : margin_(static_cast<float>(margin_m)),
+          box_(bounds(hull)),
+          accel_(std::vector<AccelPart>{{std::make_shared<const Mesh>(hull)}}) {
         box_.min.array() -= margin_m;
         box_.max.array() += margin_m;
     }
@@ -35,32 +31,13 @@ class NearHull {
     bool contains(const Vec3f& p) const {
         if (!box_.contains(p.cast<double>())) return false;
         const Hit up = accel_.closest({p, Vec3f(0.02f, 0.01f, 1.0f)});
-        if (up.is_hit() && up.normal.z() > 0) return true;
-        const auto home = cell(p);
-        for (int d = 0; d < 27; ++d) {
-            const auto it =
-                cells_.find({home[0] + d % 3 - 1, home[1] + d / 3 % 3 - 1, home[2] + d / 9 - 1});
-            if (it == cells_.end()) continue;
-            for (const Vec3f& q : it->second) {
-                if ((q - p).squaredNorm() < margin_ * margin_) return true;
-            }
-        }
-        return false;
+        return (up.is_hit() && up.normal.z() > 0) || accel_.nearest(p, margin_).is_hit();
     }
 
   private:
-    std::array<int, 3> cell(const Vec3f& p) const {
-        std::array<int, 3> c{};
-        for (int k = 0; k < 3; ++k) {
-            c[static_cast<std::size_t>(k)] = static_cast<int>(std::floor(p[k] / margin_));
-        }
-        return c;
-    }
-
-    double margin_;
-    Accel accel_;
+    float margin_;
     Box3 box_;
-    std::map<std::array<int, 3>, std::vector<Vec3f>> cells_;
+    Accel accel_;
 };
 
 /// The scan without the plane (it is rebuilt), without the candidates and what lies under the

@@ -159,6 +159,56 @@ void Accel::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occlu
 
 namespace {
 
+/// Barycentric weights (of vertices 1 and 2) of the point of a triangle nearest to p
+/// (Ericson, Real-Time Collision Detection, 5.1.5).
+Vec2f nearest_on_triangle(const Vec3f& p, const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+    const Vec3f ab = b - a, ac = c - a, ap = p - a;
+    const float d1 = ab.dot(ap), d2 = ac.dot(ap);
+    if (d1 <= 0 && d2 <= 0) return {0, 0};
+    const Vec3f bp = p - b;
+    const float d3 = ab.dot(bp), d4 = ac.dot(bp);
+    if (d3 >= 0 && d4 <= d3) return {1, 0};
+    const float vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) return {d1 / (d1 - d3), 0};
+    const Vec3f cp = p - c;
+    const float d5 = ab.dot(cp), d6 = ac.dot(cp);
+    if (d6 >= 0 && d5 <= d6) return {0, 1};
+    const float vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) return {0, d2 / (d2 - d6)};
+    const float va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        const float w = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return {1 - w, w};
+    }
+    const float sum = va + vb + vc;
+    return {vb / sum, vc / sum};
+}
+
+struct NearestQuery {
+    const std::vector<AccelPart>* parts;
+    Vec3f point;
+    Hit best;
+};
+
+bool visit_triangle(RTCPointQueryFunctionArguments* arguments) {
+    auto& query = *static_cast<NearestQuery*>(arguments->userPtr);
+    const Mesh& mesh = *(*query.parts)[arguments->geomID].mesh;
+    const Triangle& t = mesh.triangles[arguments->primID];
+    const Vec3f& a = mesh.vertices[static_cast<std::size_t>(t[0])];
+    const Vec3f& b = mesh.vertices[static_cast<std::size_t>(t[1])];
+    const Vec3f& c = mesh.vertices[static_cast<std::size_t>(t[2])];
+    const Vec2f weights = nearest_on_triangle(query.point, a, b, c);
+    const Vec3f q = a + weights.x() * (b - a) + weights.y() * (c - a);
+    const float distance = (q - query.point).norm();
+    if (!(distance < arguments->query->radius)) return false;
+    arguments->query->radius = distance;
+    query.best.distance = distance;
+    query.best.part = static_cast<int>(arguments->geomID);
+    query.best.triangle = static_cast<int>(arguments->primID);
+    query.best.barycentric = weights;
+    return true;
+}
+
 template <typename T>
 T interpolate(const std::vector<T>& values, const Triangle& t, const Vec2f& b) {
     return values[static_cast<std::size_t>(t[0])] * (1.0f - b.x() - b.y()) +
@@ -171,6 +221,25 @@ const Triangle& triangle_of(const Mesh& mesh, const Hit& hit) {
 }
 
 }  // namespace
+
+Hit Accel::nearest(const Vec3f& point, float max_distance) const {
+    if (!impl_) return {};
+    RTCPointQuery query;
+    query.x = point.x();
+    query.y = point.y();
+    query.z = point.z();
+    query.radius = max_distance;
+    query.time = 0.0f;
+    RTCPointQueryContext context;
+    rtcInitPointQueryContext(&context);
+    NearestQuery state{&parts_, point, {}};
+    rtcPointQuery(impl_->scene, &query, &context, visit_triangle, &state);
+    if (state.best.is_hit()) {
+        state.best.normal = triangle_normal(*parts_[static_cast<std::size_t>(state.best.part)].mesh,
+                                            static_cast<std::size_t>(state.best.triangle));
+    }
+    return state.best;
+}
 
 Vec3f hit_point(const Mesh& mesh, const Hit& hit) {
     return interpolate(mesh.vertices, triangle_of(mesh, hit), hit.barycentric);

@@ -49,5 +49,18 @@ TEST(Accel, OcclusionAgreesWithClosestHit) {
     }
 }
 
+TEST(Accel, NearestPointOnSphereAndPlane) {
+    const Accel accel = sphere_and_plane();
+    const Hit side = accel.nearest(Vec3f(0.8f, 0, 0.5f), 1.0f);
+    ASSERT_EQ(side.part, 0);
+    EXPECT_NEAR(side.distance, 0.3f, 1e-3f);
+    EXPECT_GT(side.normal.x(), 0.99f);
+    const Hit below = accel.nearest(Vec3f(1.3f, 0.4f, -0.2f), 1.0f);
+    ASSERT_EQ(below.part, 1);
+    EXPECT_NEAR(below.distance, 0.2f, 1e-5f);
+    EXPECT_NEAR(hit_point(*accel.parts()[1].mesh, below).x(), 1.3f, 1e-5f);
+    EXPECT_FALSE(accel.nearest(Vec3f(0, 0, 3), 1.0f).is_hit());
+}
+
 }  // namespace
 }  // namespace vitrine
