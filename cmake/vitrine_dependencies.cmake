@@ -7,6 +7,7 @@ find_package(nlohmann_json 3.11 REQUIRED)
 find_package(TBB REQUIRED)
 find_package(embree 3.13 REQUIRED)
 find_package(Open3D REQUIRED)  # 0.16.1; its version file accepts no range
+find_package(OpenMP REQUIRED COMPONENTS CXX)  # only to hold back Open3D's threads
 find_package(OpenEXR 3.1 REQUIRED)
 find_package(PNG REQUIRED)
 find_package(JPEG REQUIRED)

@@ -8,14 +8,31 @@
 #include <open3d/geometry/TriangleMesh.h>
 #include <open3d/pipelines/integration/ScalableTSDFVolume.h>
 
-#include <cstring>
+#include <omp.h>
 
 namespace vitrine {
+namespace {
+
+/// Open3D opens a parallel region per block of voxels; its waiting threads burn more time than they
+/// save, most of all when other programs run.
+class OneOpenMpThread {
+  public:
+    OneOpenMpThread() : before_(omp_get_max_threads()) { omp_set_num_threads(1); }
+    ~OneOpenMpThread() { omp_set_num_threads(before_); }
+    OneOpenMpThread(const OneOpenMpThread&) = delete;
+    OneOpenMpThread& operator=(const OneOpenMpThread&) = delete;
+
+  private:
+    int before_;
+};
+
+}  // namespace
 
 Mesh fuse_depth(std::span<const ImageF> depth_m, std::span<const Camera> cameras,
                 const FusionOptions& options) {
     namespace o3d = open3d;
     VITRINE_CHECK_EQ(depth_m.size(), cameras.size());
+    const OneOpenMpThread one_thread;
     o3d::pipelines::integration::ScalableTSDFVolume volume(
         options.voxel_m, options.truncation_m,
         o3d::pipelines::integration::TSDFVolumeColorType::NoColor);
