@@ -2,7 +2,7 @@
 // Uses the true meshes in place of a reconstruction: what is left is the estimators' own error.
 #include "base/log.h"
 #include "base/timer.h"
-#include "estimate/lights.h"
+#include "estimate/materials.h"
 #include "truth_scene.h"
 
 #include <cstdio>
@@ -41,6 +41,36 @@ void print_lights(const TrueScene& truth, const LightEstimate& estimate, double 
     }
 }
 
+void print_object(const TrueObject& truth, const ObjectEstimate& object) {
+    std::printf(
+        "  %s %s%s: class %s%s, margin %+.2f (solid %.4f shell %.4f ward %.4f diffuse %.4f)\n",
+        truth.name.c_str(), truth.is_hollow ? "hollow " : "", truth.object_class.c_str(),
+        object.is_hollow ? "hollow " : "", class_name(object.object_class).c_str(),
+        object.class_margin, object.cost_solid, object.cost_shell, object.cost_ward,
+        object.cost_diffuse);
+    if (object.object_class == ObjectClass::Transparent) {
+        const Rgb& s = object.sigma_a_per_m.value;
+        const Rgb& sd = object.sigma_a_per_m.stddev;
+        std::printf(
+            "    ior %.4f +- %.4f (true %.3f, %s), sigma_a %.2f %.2f %.2f +- %.2f %.2f %.2f (true "
+            "%.1f %.1f %.1f)\n",
+            object.ior.value, object.ior.stddev, truth.ior,
+            outcome_name(object.ior.outcome).c_str(), s[0], s[1], s[2], sd[0], sd[1], sd[2],
+            truth.sigma_a_per_m[0], truth.sigma_a_per_m[1], truth.sigma_a_per_m[2]);
+    }
+    if (object.object_class == ObjectClass::Specular)
+        for (const WardCluster& cluster : object.clusters) {
+            const Ward& w = cluster.fit.ward;
+            std::printf(
+                "    sigma %.4f +- %.4f (true %.3f), rho_d %.3f %.3f %.3f (%.2f %.2f %.2f), rho_s "
+                "%.3f %.3f %.3f (%.2f %.2f %.2f), form %s\n",
+                w.sigma_x, cluster.fit.sigma.stddev, truth.sigma, w.rho_d[0], w.rho_d[1],
+                w.rho_d[2], truth.rho_d[0], truth.rho_d[1], truth.rho_d[2], w.rho_s[0], w.rho_s[1],
+                w.rho_s[2], truth.rho_s[0], truth.rho_s[1], truth.rho_s[2],
+                w.form == WardForm::Duer ? "duer" : "ward");
+        }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -59,5 +89,10 @@ int main(int argc, char** argv) {
         const LightEstimate lights =
             estimate_lights(scene, capture.frames, capture.saturation_level, options);
         print_lights(truth, lights, timer.seconds());
+        timer = Timer();
+        const std::vector<ObjectEstimate> objects =
+            estimate_materials(scene, capture.frames, capture.saturation_level, lights);
+        std::printf("materials %.1f s\n", timer.seconds());
+        for (std::size_t k = 0; k < objects.size(); ++k) print_object(truth.objects[k], objects[k]);
     }
 }

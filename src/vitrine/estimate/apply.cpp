@@ -1,0 +1,268 @@
+#include "base/parallel.h"
+#include "estimate/scene_estimate.h"
+#include "render/estimation_caustic.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+constexpr int kGatherRays = 24;  // noisy one by one; neighbours share after smoothing
+constexpr int kSmoothRounds = 3;
+constexpr int kDiscSamples = 24;
+constexpr int kPhotons = 400'000;
+constexpr int kDiffusionRounds = 120;
+constexpr float kMaxAlbedo = 0.97f, kMinAlbedo = 0.005f;
+
+// Relative doubt of each part of the irradiance, by comparison with made scenes.
+constexpr float kDirectDoubt = 0.03f;
+constexpr float kPenumbraDoubt = 0.35f;  // of the unshadowed direct light, at half shadow
+constexpr float kCausticDoubt = 0.5f;    // caustics are sharper than a hull can tell
+constexpr float kBouncedDoubt = 0.25f;
+constexpr float kSmoothness = 25.0f;  // pull of neighbours, in units of 1 / doubt^2
+
+std::size_t at(int i) { return static_cast<std::size_t>(i); }
+
+/// Neighbours of each vertex along edges, flat.
+struct Rings {
+    std::vector<int> start, neighbour;
+};
+
+Rings rings_of(const Mesh& mesh) {
+    std::vector<std::pair<int, int>> edges;
+    edges.reserve(mesh.triangles.size() * 6);
+    for (const Triangle& t : mesh.triangles)
+        for (int e = 0; e < 3; ++e) {
+            edges.emplace_back(t[e], t[(e + 1) % 3]);
+            edges.emplace_back(t[(e + 1) % 3], t[e]);
+        }
+    std::sort(edges.begin(), edges.end());
+    edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+    Rings rings;
+    rings.start.assign(mesh.vertices.size() + 1, 0);
+    for (const auto& [a, b] : edges) {
+        ++rings.start[at(a) + 1];
+        rings.neighbour.push_back(b);
+    }
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) rings.start[i + 1] += rings.start[i];
+    return rings;
+}
+
+/// Mean over the one-ring, for quantities that are smooth but noisy. Edges over creases count less.
+template <typename T>
+void smooth(const Mesh& mesh, const Rings& rings, std::vector<T>& values, int rounds) {
+    std::vector<T> next(values.size());
+    for (int round = 0; round < rounds; ++round) {
+        parallel_for(values.size(), 2048, [&](std::size_t i) {
+            T sum = values[i];
+            float weight = 1.0f;
+            for (int k = rings.start[i]; k < rings.start[i + 1]; ++k) {
+                const std::size_t j = at(rings.neighbour[at(k)]);
+                const float w = std::max(0.0f, mesh.normals[i].dot(mesh.normals[j]));
+                sum += w * values[j];
+                weight += w;
+            }
+            next[i] = sum / weight;
+        });
+        values.swap(next);
+    }
+}
+
+struct Irradiance {
+    std::vector<Rgb> value;
+    std::vector<float> doubt;  ///< relative standard deviation
+};
+
+Irradiance irradiance_of(const EstimationScene& world, const Mesh& mesh, const Rings& rings,
+                         const std::vector<SurfacePoint>& points, const SceneEstimate& estimate) {
+    const std::size_t n = points.size();
+    std::uint32_t opaque = kScanMask, clear = 0;
+    for (int k = 0; k < world.object_count(); ++k) {
+        const bool is_clear = at(k) < estimate.objects.size() &&
+                              estimate.objects[at(k)].object_class == ObjectClass::Transparent;
+        (is_clear ? clear : opaque) |= object_mask(k);
+    }
+    std::vector<Rgb> object_radiance(at(world.object_count()), Rgb::Zero());
+    GatheredLight gathered = gather_light(world, points, kGatherRays, clear, object_radiance, 11);
+    smooth(mesh, rings, gathered.bounced, kSmoothRounds);
+    smooth(mesh, rings, gathered.openness, kSmoothRounds);
+
+    Irradiance result;
+    result.value.assign(n, Rgb::Zero());
+    result.doubt.assign(n, 0.0f);
+    std::vector<float> variance(n, 0.0f);
+    for (std::size_t i = 0; i < n; ++i) {
+        const Rgb soft =
+            gathered.bounced[i] + gathered.openness[i] * estimate.light.ambient_radiance;
+        result.value[i] = soft;
+        variance[i] = std::pow(kBouncedDoubt * luminance(soft), 2.0f);
+    }
+    for (const FittedLight& fitted : estimate.light.lights) {
+        const DiscLight& lamp = fitted.light;
+        const TrialLight trial{lamp.position_m, lamp.normal, lamp.radius_m};
+        const float strength = luminance(lamp.intensity_w_per_sr);
+        const DirectColumn lit = direct_column(world, points, trial, kDiscSamples, opaque, clear);
+        const DirectColumn open =
+            direct_column(world, points, {trial.position_m, trial.normal, 0.0}, 1, 0, 0);
+        for (std::size_t i = 0; i < n; ++i) {
+            result.value[i] += lit.clear[i] * lamp.intensity_w_per_sr;
+            const float full = open.clear[i];
+            const float share = full > 0 ? std::min(1.0f, lit.clear[i] / full) : 0.0f;
+            const float penumbra = 4.0f * share * (1.0f - share);
+            variance[i] += std::pow(kDirectDoubt * strength * lit.clear[i], 2.0f) +
+                           std::pow(kPenumbraDoubt * penumbra * strength * full, 2.0f);
+        }
+        for (int k = 0; k < world.object_count(); ++k) {
+            if ((object_mask(k) & clear) == 0) continue;
+            const ObjectEstimate& object = estimate.objects[at(k)];
+            CausticOptions options;
+            options.ior = object.ior.value;
+            options.sigma_a_per_m = object.sigma_a_per_m.value;
+            options.is_shell = object.is_hollow;
+            options.wall_m = object.wall_m;
+            options.photon_count = kPhotons;
+            const std::vector<Rgb> caustic =
+                caustic_irradiance(world, k, trial, points, opaque & ~object_mask(k), options);
+            for (std::size_t i = 0; i < n; ++i) {
+                const Rgb e = caustic[i] * lamp.intensity_w_per_sr;
+                result.value[i] += e;
+                // In the object's shadow what arrives is the caustic, and its model's doubt.
+                variance[i] += std::pow(kCausticDoubt * luminance(e), 2.0f) +
+                               std::pow(0.15f * strength * lit.through[i], 2.0f);
+            }
+        }
+    }
+    for (std::size_t i = 0; i < n; ++i)
+        result.doubt[i] = std::sqrt(variance[i]) / std::max(luminance(result.value[i]), 1e-6f);
+    return result;
+}
+
+/// Some camera looks at the point and nothing is in the way.
+std::vector<char> seen_by_cameras(const EstimationScene& world, const std::vector<Camera>& cameras,
+                                  const std::vector<SurfacePoint>& points) {
+    std::vector<Vec3f> eyes;
+    for (const Camera& camera : cameras) eyes.push_back(camera.centre_in_world().cast<float>());
+    std::vector<char> seen(points.size(), 0);
+    parallel_for(points.size(), 512, [&](std::size_t i) {
+        const SurfacePoint& p = points[i];
+        for (std::size_t f = 0; f < eyes.size() && !seen[i]; ++f) {
+            const Vec3f to_eye = eyes[f] - p.position;
+            if (p.normal.dot(to_eye) < 0.1f * to_eye.norm()) continue;
+            const Vec3 in_camera = cameras[f].cam_from_world * p.position.cast<double>();
+            if (in_camera.z() <= 0 || !cameras[f].sees(cameras[f].project_camera(in_camera)))
+                continue;
+            const Vec3f origin = p.position + world.offset_m() * p.normal;
+            seen[i] = !world.accel().is_occluded({origin, eyes[f] - origin, 0.0f, 1.0f, kAllMask});
+        }
+    });
+    return seen;
+}
+
+/// Minimises sum w (log a - log a0)^2 + sum_edges (log a_i - log a_j)^2 by Jacobi sweeps.
+void diffuse_albedo(const Rings& rings, const std::vector<float>& weight,
+                    std::vector<Rgb>& log_albedo) {
+    const std::vector<Rgb> observed = log_albedo;
+    std::vector<Rgb> next(log_albedo.size());
+    for (int round = 0; round < kDiffusionRounds; ++round) {
+        parallel_for(log_albedo.size(), 2048, [&](std::size_t i) {
+            Rgb sum = weight[i] * observed[i];
+            float total = weight[i];
+            for (int k = rings.start[i]; k < rings.start[i + 1]; ++k) {
+                sum += kSmoothness * log_albedo[at(rings.neighbour[at(k)])];
+                total += kSmoothness;
+            }
+            next[i] = total > 0.0f ? Rgb(sum / total) : observed[i];
+        });
+        log_albedo.swap(next);
+    }
+}
+
+Mesh with_albedo(const EstimationScene& world, const Scene& scene, const Mesh& radiance_mesh,
+                 const SceneEstimate& estimate) {
+    Mesh mesh = radiance_mesh;
+    if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
+    std::vector<SurfacePoint> points(mesh.vertices.size());
+    for (std::size_t i = 0; i < points.size(); ++i) points[i] = {mesh.vertices[i], mesh.normals[i]};
+    const Rings rings = rings_of(mesh);
+    const Irradiance irradiance = irradiance_of(world, mesh, rings, points, estimate);
+    const std::vector<char> seen = seen_by_cameras(world, scene.cameras, points);
+    std::vector<Rgb> log_albedo(points.size());
+    std::vector<float> weight(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const Rgb albedo = (kPif * mesh.colours[i] / irradiance.value[i].max(1e-6f))
+                               .max(kMinAlbedo)
+                               .min(kMaxAlbedo);
+        log_albedo[i] = albedo.log();
+        const float doubt = irradiance.doubt[i];
+        weight[i] = seen[i] ? 1.0f / (0.0009f + doubt * doubt) : 0.0f;
+        // The most certain points keep their texture: neighbours pull 1 % of their weight.
+        weight[i] *= doubt < 0.08f ? 4.0f : doubt < 0.2f ? 1.0f : 0.05f;
+    }
+    diffuse_albedo(rings, weight, log_albedo);
+    for (std::size_t i = 0; i < points.size(); ++i)
+        mesh.colours[i] = log_albedo[i].exp().max(kMinAlbedo).min(kMaxAlbedo);
+    return mesh;
+}
+
+/// Outer surface and an inner one `wall_m` further in, facing the cavity: a thin-walled vessel.
+Mesh shell_of(const Mesh& hull, double wall_m) {
+    Mesh shell = hull;
+    if (shell.normals.empty()) shell.normals = vertex_normals(shell);
+    const auto count = static_cast<int>(shell.vertices.size());
+    const std::size_t triangles = shell.triangles.size();
+    shell.colours.clear();
+    shell.uv.clear();
+    for (int i = 0; i < count; ++i) {
+        const Vec3f normal = shell.normals[at(i)];
+        shell.vertices.push_back(shell.vertices[at(i)] - static_cast<float>(wall_m) * normal);
+        shell.normals.push_back(-normal);
+    }
+    for (std::size_t t = 0; t < triangles; ++t) {
+        const Triangle outer = shell.triangles[t];
+        shell.triangles.emplace_back(outer[0] + count, outer[2] + count, outer[1] + count);
+    }
+    return shell;
+}
+
+}  // namespace
+
+Scene apply(const Scene& scene, const SceneEstimate& estimate, const Progress& progress) {
+    Scene result = scene;
+    result.lights = to_lights(estimate.light);
+    result.ambient_radiance = estimate.light.ambient_radiance;
+    const EstimationScene world(scene);
+    for (std::size_t p = 0; p < scene.parts.size(); ++p) {
+        progress.update(static_cast<double>(p) / static_cast<double>(scene.parts.size()),
+                        "albedo of the scan");
+        Part& part = result.parts[p];
+        const int k = world.object_of_part(static_cast<int>(p));
+        if (k < 0) {
+            if (part.mesh->colours.empty() || estimate.light.lights.empty()) continue;
+            part.mesh =
+                std::make_shared<const Mesh>(with_albedo(world, scene, *part.mesh, estimate));
+            continue;
+        }
+        if (at(k) >= estimate.objects.size()) continue;
+        const ObjectEstimate& object = estimate.objects[at(k)];
+        ObjectClass c = object.object_class;
+        if (c == ObjectClass::Unsure)
+            c = object.class_margin > 0.0 ? ObjectClass::Transparent : ObjectClass::Specular;
+        if (c == ObjectClass::Transparent) {
+            part.material = Dielectric{object.ior.value, object.sigma_a_per_m.value};
+            if (object.is_hollow && object.wall_m > 0.0)
+                part.mesh = std::make_shared<const Mesh>(shell_of(*part.mesh, object.wall_m));
+        } else if (c == ObjectClass::Specular && !object.clusters.empty()) {
+            part.material = object.clusters.front().fit.ward;
+        } else {
+            Diffuse diffuse;
+            diffuse.albedo = object.albedo;
+            part.material = diffuse;
+        }
+    }
+    progress.update(1.0);
+    return result;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,130 @@
+#include "estimate/materials.h"
+
+#include "base/log.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+// A lobe must improve a diffuse fit by this much (in the logarithm) to be believed.
+constexpr double kLobeGain = 0.15;
+constexpr int kMinPixels = 60;
+
+const ObjectOverride* find_override(const std::vector<ObjectOverride>& overrides,
+                                    const std::string& id) {
+    for (const ObjectOverride& o : overrides)
+        if (o.id == id) return &o;
+    return nullptr;
+}
+
+double log_ratio(double a, double b) { return std::log(std::max(a, 1e-4) / std::max(b, 1e-4)); }
+
+/// Class by cost; fills margin and reason.
+ObjectClass classify(ObjectEstimate& object, const WardFit& ward, double unsure_margin) {
+    const double clear = std::min(object.cost_solid, object.cost_shell);
+    object.class_margin = log_ratio(object.cost_ward, clear);
+    if (std::abs(object.class_margin) < unsure_margin) {
+        object.reason = "glass and metal explain its pictures about equally well";
+        return ObjectClass::Unsure;
+    }
+    if (object.class_margin > 0.0) return ObjectClass::Transparent;
+    if (log_ratio(ward.cost_diffuse, ward.cost) < kLobeGain) return ObjectClass::Diffuse;
+    return ObjectClass::Specular;
+}
+
+}  // namespace
+
+std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
+                                               std::span<const RgbdFrame> frames,
+                                               double saturation_level, const LightEstimate& lights,
+                                               const std::vector<ObjectOverride>& overrides,
+                                               const MaterialOptions& options,
+                                               const Progress& progress) {
+    std::vector<ObjectEstimate> objects;
+    const EstimationScene world(scene);
+    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
+    const double bright = bright_level(lookup);
+    KnownLight known;
+    known.ambient = lights.ambient_radiance;
+    for (const FittedLight& fitted : lights.lights) known.lights.push_back(fitted.light);
+
+    for (int k = 0; k < world.object_count(); ++k) {
+        progress.update(static_cast<double>(k) / world.object_count(), "materials");
+        ObjectEstimate object;
+        const Part& part = scene.parts[static_cast<std::size_t>(world.part_of_object(k))];
+        object.id = part.name;
+        object.mesh_file = part.mesh_file;
+        const ObjectOverride* override = find_override(overrides, object.id);
+        const std::vector<ObjectPixel> pixels = object_pixels(world, lookup, k, options.pixels);
+        if (static_cast<int>(pixels.size()) < kMinPixels) {
+            object.reason = "too few pixels show this object";
+            objects.push_back(object);
+            continue;
+        }
+        TransparentOptions transparent = options.transparent;
+        transparent.ambient = lights.ambient_radiance;
+        if (override) {
+            transparent.known_ior = override->ior;
+            transparent.known_sigma_a = override->sigma_a_per_m;
+        }
+        const TransparentFit solid = fit_solid(world, lookup, k, pixels, bright, transparent);
+        const TransparentFit shell = fit_shell(world, lookup, k, pixels, bright, transparent);
+        known.opaque_mask = kScanMask | object_mask(k);
+        const SpecularModel model(world, pixels, known, options.specular);
+        const WardFit ward = fit_ward(model, bright, options.specular);
+        object.cost_solid = solid.cost;
+        object.cost_shell = shell.cost;
+        object.cost_ward = ward.cost;
+        object.cost_diffuse = ward.cost_diffuse;
+        object.class_margin = 0.0;
+        object.object_class = classify(object, ward, options.unsure_margin);
+        log_debug(
+            "{}: {} pixels, costs solid {:.4f} (n {:.3f}, seen {:.2f}) shell {:.4f} (seen {:.2f}) "
+            "ward {:.4f} (sigma {:.3f}, lobe {:.2f}) diffuse {:.4f}",
+            object.id, pixels.size(), solid.cost, solid.ior.value, solid.explained, shell.cost,
+            shell.explained, ward.cost, ward.sigma.value, ward.lobe_share, ward.cost_diffuse);
+        if (override && override->ignore) object.object_class = ObjectClass::Diffuse;
+        if (override && override->object_class) object.object_class = *override->object_class;
+
+        const TransparentFit& clear = shell.cost < solid.cost ? shell : solid;
+        object.ior = clear.ior;
+        object.sigma_a_per_m = clear.sigma_a_per_m;
+        object.is_hollow = clear.is_shell;
+        object.wall_m = clear.wall_m;
+        object.clusters = {{1.0, ward}};
+        object.albedo = ward.albedo;
+        objects.push_back(object);
+    }
+    progress.update(1.0);
+    return objects;
+}
+
+void refit_specular(const Scene& scene, std::span<const RgbdFrame> frames, double saturation_level,
+                    const LightEstimate& lights, const MaterialOptions& options,
+                    std::vector<ObjectEstimate>& objects, const Progress& progress) {
+    const EstimationScene world(scene);
+    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
+    const double bright = bright_level(lookup);
+    KnownLight known;
+    known.ambient = lights.ambient_radiance;
+    for (const FittedLight& fitted : lights.lights) known.lights.push_back(fitted.light);
+    for (int k = 0; k < world.object_count(); ++k) {
+        progress.update(static_cast<double>(k) / world.object_count(), "materials again");
+        ObjectEstimate& object = objects[static_cast<std::size_t>(k)];
+        if (object.object_class == ObjectClass::Transparent) continue;
+        const std::vector<ObjectPixel> pixels = object_pixels(world, lookup, k, options.pixels);
+        if (static_cast<int>(pixels.size()) < kMinPixels) continue;
+        known.opaque_mask = kScanMask | object_mask(k);
+        const SpecularModel model(world, pixels, known, options.specular);
+        const WardFit ward = fit_ward(model, bright, options.specular);
+        object.cost_ward = ward.cost;
+        object.cost_diffuse = ward.cost_diffuse;
+        object.albedo = ward.albedo;
+        object.clusters = {{1.0, ward}};
+    }
+}
+
+}  // namespace vitrine

@@ -1,0 +1,98 @@
+#include "estimate/scene_estimate.h"
+
+#include "base/log.h"
+#include "base/timer.h"
+
+namespace vitrine {
+
+namespace {
+
+std::vector<ObjectClass> classes_of(const std::vector<ObjectEstimate>& objects) {
+    std::vector<ObjectClass> classes;
+    for (const ObjectEstimate& object : objects) classes.push_back(object.object_class);
+    return classes;
+}
+
+/// The light cost, and the fitted cost of every object, as one figure.
+double total_error(const LightEstimate& light, const std::vector<ObjectEstimate>& objects) {
+    double sum = light.error_refined;
+    for (const ObjectEstimate& o : objects)
+        sum += o.object_class == ObjectClass::Specular      ? o.cost_ward
+               : o.object_class == ObjectClass::Transparent ? std::min(o.cost_solid, o.cost_shell)
+                                                            : o.cost_diffuse;
+    return sum / (1.0 + static_cast<double>(objects.size()));
+}
+
+}  // namespace
+
+bool SceneEstimate::is_complete() const {
+    if (light.outcome != Outcome::Converged) return false;
+    for (const ObjectEstimate& object : objects) {
+        switch (object.object_class) {
+            case ObjectClass::Unsure:
+                return false;
+            case ObjectClass::Transparent:
+                if (object.ior.outcome != Outcome::Converged ||
+                    object.sigma_a_per_m.outcome != Outcome::Converged)
+                    return false;
+                break;
+            case ObjectClass::Specular:
+                for (const WardCluster& cluster : object.clusters)
+                    if (cluster.fit.sigma.outcome != Outcome::Converged) return false;
+                break;
+            case ObjectClass::Diffuse:
+                break;
+        }
+    }
+    return true;
+}
+
+SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
+                             const EstimateOptions& options, const Progress& progress) {
+    SceneEstimate result;
+    LightOptions light_options = options.lights;
+    light_options.seed = options.seed;
+    if (!light_options.reference_albedo) light_options.reference_albedo = capture.reference_albedo;
+    if (!options.overrides.lights.empty()) light_options.known_lights = options.overrides.lights;
+
+    Timer timer;
+    result.light = estimate_lights(scene, capture.frames, capture.saturation_level, light_options,
+                                   progress.part(0.0, 0.4));
+    result.seconds.emplace_back("light", timer.seconds());
+    if (result.light.lights.empty()) return result;
+
+    timer = Timer();
+    result.objects =
+        estimate_materials(scene, capture.frames, capture.saturation_level, result.light,
+                           options.overrides.objects, options.materials, progress.part(0.4, 0.7));
+    result.seconds.emplace_back("materials", timer.seconds());
+    result.error_initial = total_error(result.light, result.objects);
+    result.error_joint = result.error_initial;
+
+    if (options.refine_jointly && !result.objects.empty()) {
+        timer = Timer();
+        LightOptions again = light_options;
+        again.object_classes = classes_of(result.objects);
+        std::vector<DiscLight> start;
+        for (const FittedLight& fitted : result.light.lights) start.push_back(fitted.light);
+        again.start = start;
+        LightEstimate refined = estimate_lights(scene, capture.frames, capture.saturation_level,
+                                                again, progress.part(0.7, 0.85));
+        refined.error_initial = result.light.error_initial;
+        refined.grid_direction = result.light.grid_direction;
+        result.light = refined;
+        refit_specular(scene, capture.frames, capture.saturation_level, result.light,
+                       options.materials, result.objects, progress.part(0.85, 1.0));
+        result.error_joint = total_error(result.light, result.objects);
+        result.seconds.emplace_back("joint", timer.seconds());
+    }
+    if (options.lambertian)
+        for (ObjectEstimate& object : result.objects) {
+            object.object_class = ObjectClass::Diffuse;
+            object.reason = "forced to diffuse";
+        }
+    progress.update(1.0);
+    return result;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,264 @@
+#include "estimate/transparent.h"
+
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "math/optimise.h"
+#include "math/statistics.h"
+#include "optics/fresnel.h"
+#include "render/estimation_refraction.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+constexpr double kCap = 0.25;  // of the bright level: beyond, a pixel is simply wrong
+constexpr int kIorGrid = 21;   // step 0.04: no basin of the objective is narrower
+constexpr int kBootstrapRounds = 40;
+constexpr float kMinLength = 0.005f;  // metres: shorter ways tell nothing of absorption
+constexpr double kMinExplained = 0.15;
+constexpr double kDefaultWall = 0.0025;
+
+Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& direction,
+                const Rgb& ambient) {
+    const Hit hit = scene.accel().closest({origin, direction, 1e-4f, 1e30f, kScanMask});
+    const std::optional<Rgb> seen = scene.scan_radiance(hit, direction);
+    return seen ? *seen : ambient;
+}
+
+template <typename Trace>
+std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLookup& lookup,
+                                  const std::vector<ObjectPixel>& pixels, const Rgb& ambient,
+                                  const Trace& trace) {
+    std::vector<ThroughPixel> result(pixels.size());
+    parallel_for(pixels.size(), 16, [&](std::size_t i) {
+        const ObjectPixel& pixel = pixels[i];
+        const RefractedPath path = trace(pixel);
+        if (!path.is_valid) return;
+        const Hit hit = scan_behind(scene, path, scene.offset_m());
+        Rgb background = ambient;
+        if (hit.is_hit()) {
+            if (hit.normal.dot(path.exit_direction) >= 0.0f) return;
+            const Mesh& mesh = scene.mesh(hit.part);
+            const std::optional<Rgb> seen =
+                lookup.background({hit_point(mesh, hit), shading_normal(mesh, hit)}, -1);
+            if (!seen) return;
+            background = *seen;
+        }
+        const Vec3f mirrored = reflect(-pixel.direction, path.entry_normal);
+        result[i].transmitted = path.transmittance * background;
+        result[i].reflected =
+            path.entry_reflectance * environment(scene, path.entry, mirrored, ambient);
+        result[i].length_m = path.length_m;
+        result[i].is_valid = true;
+    });
+    return result;
+}
+
+double pixel_cost(const ThroughPixel& t, const ObjectPixel& p, const Rgb& sigma_a, double bright) {
+    const Rgb model = t.transmitted * (-sigma_a * t.length_m).exp() + t.reflected;
+    return std::min(static_cast<double>((model - p.radiance).abs().mean()) / bright, kCap);
+}
+
+/// Cost with absorption fitted, over the pixels `weight` counts (bootstrap), or all if empty.
+struct Profile {
+    Rgb sigma_a = Rgb::Zero();
+    double cost = 1.0;
+};
+
+Rgb absorption_of(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
+                  double bright, const std::vector<int>& count) {
+    Rgb sigma_a = Rgb::Zero();
+    std::vector<double> value, weight;
+    for (int c = 0; c < 3; ++c) {
+        value.clear();
+        weight.clear();
+        for (std::size_t i = 0; i < pixels.size(); ++i) {
+            const ThroughPixel& t = through[i];
+            if (!t.is_valid || pixels[i].is_clipped || t.length_m < kMinLength) continue;
+            const double r0 = t.transmitted[c], r = pixels[i].radiance[c] - t.reflected[c];
+            if (r0 < 0.02 * bright) continue;
+            // A pixel darker than its reflection only says "much": keep it, at a large value.
+            value.push_back(std::log(r0 / std::max(r, 0.002 * bright)) / t.length_m);
+            weight.push_back(t.length_m * (count.empty() ? 1 : count[i]));
+        }
+        double total = 0.0;
+        for (const double w : weight) total += w;
+        if (total > 0.0)
+            sigma_a[c] = static_cast<float>(std::max(0.0, weighted_median(value, weight)));
+    }
+    return sigma_a;
+}
+
+double cost_of(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
+               const Rgb& sigma_a, double bright, const std::vector<int>& count) {
+    double sum = 0.0, total = 0.0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        if (!through[i].is_valid || pixels[i].is_clipped) continue;
+        const double w = count.empty() ? 1.0 : count[i];
+        sum += w * pixel_cost(through[i], pixels[i], sigma_a, bright);
+        total += w;
+    }
+    return total > 0.0 ? sum / total : 1.0;
+}
+
+double share_explained(const std::vector<ThroughPixel>& through) {
+    const auto valid = std::count_if(through.begin(), through.end(),
+                                     [](const ThroughPixel& t) { return t.is_valid; });
+    return through.empty() ? 0.0 : static_cast<double>(valid) / static_cast<double>(through.size());
+}
+
+/// How often each pixel is drawn when whole views are drawn with replacement.
+std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view_count,
+                                std::uint64_t round) {
+    Rng rng(stream_key(0xb007u, round));
+    std::vector<int> drawn(static_cast<std::size_t>(view_count), 0);
+    for (int k = 0; k < view_count; ++k)
+        ++drawn[rng.next_index(static_cast<std::uint32_t>(view_count))];
+    std::vector<int> count(pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+        count[i] = drawn[static_cast<std::size_t>(pixels[i].frame)];
+    return count;
+}
+
+}  // namespace
+
+std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
+                                       int object, const std::vector<ObjectPixel>& pixels,
+                                       double ior, const Rgb& ambient) {
+    return predict(scene, lookup, pixels, ambient, [&](const ObjectPixel& p) {
+        return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior));
+    });
+}
+
+std::vector<ThroughPixel> look_through_shell(const EstimationScene& scene,
+                                             const FrameLookup& lookup, int object,
+                                             const std::vector<ObjectPixel>& pixels, double ior,
+                                             const Rgb& ambient) {
+    return predict(scene, lookup, pixels, ambient, [&](const ObjectPixel& p) {
+        return pass_through_shell(scene, object, p.eye, p.direction, static_cast<float>(ior), 1.0f);
+    });
+}
+
+Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
+                   double bright) {
+    return absorption_of(through, pixels, bright, {});
+}
+
+double through_cost(const std::vector<ThroughPixel>& through,
+                    const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright) {
+    return cost_of(through, pixels, sigma_a, bright, {});
+}
+
+TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup, int object,
+                         const std::vector<ObjectPixel>& pixels, double bright,
+                         const TransparentOptions& options) {
+    TransparentFit fit;
+    const auto sigma_for = [&](const std::vector<ThroughPixel>& through,
+                               const std::vector<int>& count) {
+        return options.known_sigma_a ? *options.known_sigma_a
+                                     : absorption_of(through, pixels, bright, count);
+    };
+    std::vector<double> trial;
+    std::vector<std::vector<ThroughPixel>> predicted;
+    const auto evaluate = [&](double ior) {
+        predicted.push_back(look_through(scene, lookup, object, pixels, ior, options.ambient));
+        trial.push_back(ior);
+        return cost_of(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
+    };
+    double best_ior = 0.0;
+    if (options.known_ior) {
+        best_ior = *options.known_ior;
+        evaluate(best_ior);
+    } else {
+        Minimum1d minimum =
+            minimise_grid_golden(evaluate, options.ior_min, options.ior_max, kIorGrid, 9);
+        best_ior = minimum.x;
+        if (options.ior_step > 0.0)
+            best_ior =
+                options.ior_min +
+                options.ior_step * std::round((best_ior - options.ior_min) / options.ior_step);
+        fit.ior.outcome = minimum.is_at_bound ? Outcome::AtBound : Outcome::Converged;
+        if (minimum.is_at_bound) fit.ior.reason = "the best index lies at the end of the range";
+    }
+    const std::vector<ThroughPixel> best =
+        look_through(scene, lookup, object, pixels, best_ior, options.ambient);
+    fit.ior.value = best_ior;
+    fit.sigma_a_per_m.value = sigma_for(best, {});
+    fit.cost = cost_of(best, pixels, fit.sigma_a_per_m.value, bright, {});
+    fit.explained = share_explained(best);
+    fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
+
+    // Bootstrap over views among the trials already traced, with a parabola between them.
+    std::vector<double> iors;
+    std::array<std::vector<double>, 3> sigmas;
+    const int views = static_cast<int>(lookup.frames().size());
+    std::vector<std::size_t> order(trial.size());
+    for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+    std::sort(order.begin(), order.end(),
+              [&](std::size_t a, std::size_t b) { return trial[a] < trial[b]; });
+    for (int round = 0; round < kBootstrapRounds; ++round) {
+        const std::vector<int> count =
+            resample_views(pixels, views, static_cast<std::uint64_t>(round));
+        std::size_t at = order[0];
+        double least = 2.0;
+        for (const std::size_t k : order) {
+            const double cost =
+                cost_of(predicted[k], pixels, sigma_for(predicted[k], count), bright, count);
+            if (cost < least) {
+                least = cost;
+                at = k;
+            }
+        }
+        iors.push_back(trial[at]);
+        const Rgb sigma = sigma_for(predicted[at], count);
+        for (int c = 0; c < 3; ++c) sigmas[static_cast<std::size_t>(c)].push_back(sigma[c]);
+    }
+    fit.ior.stddev = options.known_ior ? 0.0 : std::max(0.003, standard_deviation(iors));
+    for (int c = 0; c < 3; ++c)
+        fit.sigma_a_per_m.stddev[c] = static_cast<float>(
+            std::max(0.1, standard_deviation(sigmas[static_cast<std::size_t>(c)])));
+    fit.sigma_a_per_m.outcome = Outcome::Converged;
+    if (options.known_ior) fit.ior.outcome = Outcome::Converged;
+    if (fit.explained < kMinExplained) {
+        fit.ior.outcome = fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
+        fit.ior.reason = fit.sigma_a_per_m.reason =
+            "too little of what is seen through the object is seen past it in another view";
+    } else if (!options.known_ior && fit.ior.stddev > 0.1) {
+        fit.ior.outcome = Outcome::Ambiguous;
+        fit.ior.reason = "different views ask for different indices";
+    }
+    return fit;
+}
+
+TransparentFit fit_shell(const EstimationScene& scene, const FrameLookup& lookup, int object,
+                         const std::vector<ObjectPixel>& pixels, double bright,
+                         const TransparentOptions& options) {
+    TransparentFit fit;
+    fit.is_shell = true;
+    fit.wall_m = kDefaultWall;
+    const double ior = options.known_ior.value_or(options.shell_ior);
+    std::vector<ThroughPixel> through =
+        look_through_shell(scene, lookup, object, pixels, ior, options.ambient);
+    for (ThroughPixel& t : through) t.length_m *= static_cast<float>(kDefaultWall);
+    // Walls are thin: the weighted median over all lengths, without a least length.
+    for (ThroughPixel& t : through) t.length_m = std::max(t.length_m, kMinLength);
+    fit.sigma_a_per_m.value =
+        options.known_sigma_a.value_or(absorption_of(through, pixels, bright, {}));
+    fit.cost = cost_of(through, pixels, fit.sigma_a_per_m.value, bright, {});
+    fit.explained = share_explained(through);
+    fit.ior.value = ior;
+    fit.ior.stddev = 0.1;
+    fit.ior.outcome = options.known_ior ? Outcome::Converged : Outcome::NotIdentifiable;
+    fit.ior.reason = "thin walls hardly bend light: the index of common glass is assumed";
+    fit.sigma_a_per_m.stddev = Rgb::Constant(5.0f);
+    fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
+    fit.sigma_a_per_m.reason =
+        "walls too thin for a colour to build up; their thickness is a guess";
+    fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
+    return fit;
+}
+
+}  // namespace vitrine
