@@ -14,13 +14,13 @@ namespace vitrine {
 namespace {
 
 /// Open3D opens a parallel region per block of voxels; its waiting threads burn more time than they
-/// save, most of all when other programs run.
-class OneOpenMpThread {
+/// save, most of all when other programs run. No active level: every region runs on one thread.
+class NoOpenMpThreads {
   public:
-    OneOpenMpThread() : before_(omp_get_max_threads()) { omp_set_num_threads(1); }
-    ~OneOpenMpThread() { omp_set_num_threads(before_); }
-    OneOpenMpThread(const OneOpenMpThread&) = delete;
-    OneOpenMpThread& operator=(const OneOpenMpThread&) = delete;
+    NoOpenMpThreads() : before_(omp_get_max_active_levels()) { omp_set_max_active_levels(0); }
+    ~NoOpenMpThreads() { omp_set_max_active_levels(before_); }
+    NoOpenMpThreads(const NoOpenMpThreads&) = delete;
+    NoOpenMpThreads& operator=(const NoOpenMpThreads&) = delete;
 
   private:
     int before_;
@@ -32,7 +32,7 @@ Mesh fuse_depth(std::span<const ImageF> depth_m, std::span<const Camera> cameras
                 const FusionOptions& options) {
     namespace o3d = open3d;
     VITRINE_CHECK_EQ(depth_m.size(), cameras.size());
-    const OneOpenMpThread one_thread;
+    const NoOpenMpThreads no_threads;
     o3d::pipelines::integration::ScalableTSDFVolume volume(
         options.voxel_m, options.truncation_m,
         o3d::pipelines::integration::TSDFVolumeColorType::NoColor);

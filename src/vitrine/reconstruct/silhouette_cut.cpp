@@ -34,6 +34,7 @@ class LikelihoodRatio {
             ratio_[b] = std::clamp(std::log(p / q), -kMaxEvidence, kMaxEvidence);
         }
     }
+    void set_neutral(std::size_t bin) { ratio_[bin] = 0.0f; }
     float operator[](std::size_t bin) const { return ratio_[bin]; }
 
   private:
@@ -89,6 +90,8 @@ Cues learn(std::span<const SilhouetteView> views, double saturation_level) {
     }
     cues.depth.finish(30.0f);
     cues.difference.finish(30.0f);
+    // What no other view shows lies mostly under objects, but that says nothing about this pixel.
+    cues.difference.set_neutral(kDifferenceBins - 1);
     cues.colour.finish(4.0f);
     return cues;
 }
