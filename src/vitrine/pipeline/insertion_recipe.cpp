@@ -1,0 +1,353 @@
+#include "pipeline/insertion_recipe.h"
+
+#include "base/file.h"
+#include "base/json_reader.h"
+#include "base/text.h"
+#include "compose/composite.h"
+#include "estimate/estimate_json.h"
+#include "estimate/scene_estimate.h"
+#include "geometry/mesh_io.h"
+#include "image/colour.h"
+#include "image/image_io.h"
+#include "pipeline/report.h"
+#include "pipeline/scan_files.h"
+#include "reconstruct/labelled_scene.h"
+#include "scene/scene_json.h"
+
+#include <algorithm>
+
+namespace vitrine {
+namespace fs = std::filesystem;
+namespace {
+
+/// Hash of what a capture's reader looks at; pictures of truth and insertion files do not count.
+std::string hash_capture(const fs::path& folder) {
+    std::uint64_t hash = hash_bytes("");
+    std::vector<std::string> files;
+    for (const char* name :
+         {"rgb.txt", "depth.txt", "associations.txt", "groundtruth.txt", "camera_intrinsic.json",
+          "depth_camera_intrinsic.json", "capture.json"}) {
+        if (fs::exists(folder / name)) files.emplace_back(name);
+    }
+    for (const char* sub : {"rgb", "depth"}) {
+        for (const std::string& file : files_below(folder, sub)) files.push_back(file);
+    }
+    for (const std::string& file : files) {
+        hash = hash_bytes(fmt::format("{} {:016x}", file, hash_file(folder / file)), hash);
+    }
+    return fmt::format("{:016x}", hash);
+}
+
+std::string hash_if_given(const fs::path& path) {
+    if (path.empty()) return "none";
+    if (fs::is_directory(path)) return hash_folder(path, {});
+    return fs::exists(path) ? fmt::format("{:016x}", hash_file(path)) : "missing";
+}
+
+/// An insertion is its file, the meshes and materials beside it, and where it goes.
+std::string insertion_identity(const InsertionRunOptions& options) {
+    std::string text = hash_if_given(options.insertion);
+    if (options.at) {
+        text += fmt::format(" at {} {} {}", options.at->frame, options.at->pixel.x(),
+                            options.at->pixel.y());
+    } else if (!options.insertion.empty() && fs::exists(options.insertion)) {
+        for (const Part& part : read_insertion(options.insertion).objects) {
+            text += " " + hash_if_given(options.insertion.parent_path() / part.mesh_file);
+        }
+    }
+    return text;
+}
+
+/// Hulls whose box a mesh of `folder` overlaps give way to that mesh.
+void replace_hulls(Candidates& candidates, const fs::path& folder) {
+    constexpr double kMinShare = 0.3;  // of the union of the boxes: the same thing, roughly placed
+    if (!fs::is_directory(folder)) {
+        throw InputError({folder.string(), "a folder of PLY meshes", "no such folder", ""});
+    }
+    for (const auto& entry : fs::directory_iterator(folder)) {
+        if (entry.path().extension() != ".ply") continue;
+        const Mesh mesh = read_ply(entry.path());
+        const Box3 box = bounds(mesh);
+        for (Candidate& candidate : candidates.objects) {
+            const Vec3 low = box.min.cwiseMax(candidate.box.min);
+            const Vec3 high = box.max.cwiseMin(candidate.box.max);
+            if ((high.array() <= low.array()).any()) continue;
+            const double both = (high - low).prod();
+            if (both < kMinShare * (box.size().prod() + candidate.box.size().prod() - both))
+                continue;
+            candidate.hull = mesh;
+            if (mesh.normals.empty())
+                candidate.hull = with_creased_normals(welded(mesh, 1e-7), 40.0);
+            candidate.box = box;
+            candidate.evidence +=
+                " Its geometry was given (" + entry.path().filename().string() + ").";
+        }
+    }
+}
+
+void add_if_weak(const std::string& what, Outcome outcome, const std::string& reason,
+                 std::vector<std::string>& sentences) {
+    if (outcome == Outcome::Converged) return;
+    sentences.push_back(what + " is " + outcome_name(outcome) +
+                        (reason.empty() ? "" : ": " + reason));
+}
+
+/// One sentence for each quantity that the data do not hold.
+std::vector<std::string> uncertain_quantities(const SceneEstimate& estimate) {
+    std::vector<std::string> sentences;
+    add_if_weak("the light", estimate.light.outcome, estimate.light.reason, sentences);
+    for (const ObjectEstimate& object : estimate.objects) {
+        switch (object.object_class) {
+            case ObjectClass::Unsure:
+                sentences.push_back(object.id + " is neither clearly glass nor clearly metal" +
+                                    (object.reason.empty() ? "" : ": " + object.reason));
+                break;
+            case ObjectClass::Transparent:
+                add_if_weak("the refractive index of " + object.id, object.ior.outcome,
+                            object.ior.reason, sentences);
+                add_if_weak("the absorption of " + object.id, object.sigma_a_per_m.outcome,
+                            object.sigma_a_per_m.reason, sentences);
+                break;
+            case ObjectClass::Specular:
+                for (const WardCluster& cluster : object.clusters) {
+                    add_if_weak("the gloss of " + object.id, cluster.fit.sigma.outcome,
+                                cluster.fit.sigma.reason, sentences);
+                }
+                break;
+            case ObjectClass::Diffuse:
+                break;
+        }
+    }
+    return sentences;
+}
+
+class InsertionRun {
+  public:
+    InsertionRun(const fs::path& capture_folder, Workspace& workspace,
+                 const InsertionRunOptions& options, const StageProgress& progress)
+        : workspace_(workspace),
+          options_(options),
+          progress_(progress),
+          capture_hash_(hash_capture(capture_folder)),
+          capture_(read_capture(capture_folder, progress("read"))) {
+        result_.warnings = capture_.warnings;
+    }
+
+    InsertionRunResult run(InsertionStage last) {
+        reconstruct();
+        if (last >= InsertionStage::Candidates) candidates();
+        if (last >= InsertionStage::Lights) lights();
+        if (last >= InsertionStage::Materials) materials();
+        if (last >= InsertionStage::Insert && !options_.insertion.empty()) insert();
+        if (last >= InsertionStage::Report) {
+            write_insertion_report(workspace_.folder(), capture_.name, capture_.warnings);
+        }
+        return result_;
+    }
+
+  private:
+    void reconstruct() {
+        identity_ = workspace_.run_stage(
+            "reconstruct", {capture_hash_, std::to_string(static_cast<int>(options_.poses))},
+            [&] {
+                ScanOptions scan_options;
+                scan_options.poses = options_.poses;
+                write_scan(workspace_.path("10_scan"),
+                           make_scan(capture_, scan_options, progress_("reconstruct")), capture_);
+            },
+            [&] { return files_below(workspace_.folder(), "10_scan"); });
+    }
+
+    void candidates() {
+        const fs::path edits = workspace_.path("edits/silhouettes");
+        identity_ = workspace_.run_stage(
+            "candidates", {identity_, hash_if_given(options_.geometry), hash_if_given(edits)},
+            [&] {
+                CandidateOptions candidate_options;
+                candidate_options.edited_silhouettes = read_edited_silhouettes(edits, capture_);
+                Candidates found =
+                    find_candidates(capture_, scan(), candidate_options, progress_("candidates"));
+                if (!options_.geometry.empty()) replace_hulls(found, options_.geometry);
+                write_candidates(workspace_.path("20_candidates"), found, capture_);
+            },
+            [&] { return files_below(workspace_.folder(), "20_candidates"); });
+    }
+
+    EstimateOptions estimate_options() const {
+        EstimateOptions estimate;
+        estimate.lambertian = options_.lambertian;
+        estimate.seed = options_.seed;
+        if (!options_.overrides.empty()) estimate.overrides = read_overrides(options_.overrides);
+        return estimate;
+    }
+
+    void lights() {
+        identity_ = workspace_.run_stage(
+            "lights", {identity_, hash_if_given(options_.overrides), std::to_string(options_.seed)},
+            [&] {
+                EstimateOptions estimate = estimate_options();
+                LightOptions light = estimate.lights;
+                light.reference_albedo = capture_.reference_albedo;
+                light.known_lights = estimate.overrides.lights;
+                light.seed = options_.seed;
+                SceneEstimate first;
+                first.light = estimate_lights(scene(), capture_.frames, capture_.saturation_level,
+                                              light, progress_("lights"));
+                write_estimate(workspace_.path("30_lights.json"), first);
+            },
+            [] { return std::vector<std::string>{"30_lights.json"}; });
+    }
+
+    /// 40_materials.json: what each part is made of, in the form that scene files take.
+    static void write_materials(const fs::path& path, const Scene& scene) {
+        Json json;
+        json["schema"] = "vitrine.materials/1";
+        json["parts"] = Json::array();
+        for (const Part& part : scene.parts) {
+            json["parts"].push_back({{"name", part.name}, {"material", to_json(part.material)}});
+        }
+        write_json_file(path, json);
+    }
+
+    void materials() {
+        identity_ = workspace_.run_stage(
+            "materials", {identity_, options_.lambertian ? "lambertian" : "full"},
+            [&] {
+                EstimateOptions options = estimate_options();
+                std::vector<DiscLight> start;
+                for (const FittedLight& fitted :
+                     read_estimate(workspace_.path("30_lights.json")).light.lights) {
+                    start.push_back(fitted.light);
+                }
+                options.lights.start = start;
+                SceneEstimate estimate =
+                    estimate_scene(scene(), capture_, options, progress_("materials"));
+                for (ObjectEstimate& object : estimate.objects) {
+                    object.mesh_file = "20_candidates/" + object.id + ".ply";
+                }
+                write_estimate(workspace_.path("estimate.json"), estimate);
+                const Scene measured = apply(scene(), estimate);
+                write_materials(workspace_.path("40_materials.json"), measured);
+                write_scene(workspace_.path("40_scene/scene.json"), measured);
+            },
+            [&] {
+                std::vector<std::string> files = files_below(workspace_.folder(), "40_scene");
+                files.insert(files.end(), {"40_materials.json", "estimate.json"});
+                return files;
+            });
+        result_.uncertain = uncertain_quantities(read_estimate(workspace_.path("estimate.json")));
+    }
+
+    void insert() {
+        identity_ = workspace_.run_stage(
+            "insert",
+            {identity_, insertion_identity(options_),
+             std::to_string(static_cast<int>(options_.quality)),
+             std::to_string(options_.photon_count), std::to_string(options_.seed)},
+            [&] { render_insertion(); },
+            [&] {
+                std::vector<std::string> files = files_below(workspace_.folder(), "50_insert");
+                for (const std::string& file : files_below(workspace_.folder(), "60_composite")) {
+                    files.push_back(file);
+                }
+                return files;
+            });
+        for (const std::string& file : files_below(workspace_.folder(), "60_composite")) {
+            if (file.ends_with(".png") && !file.ends_with("_plate.png")) {
+                result_.pictures.push_back(workspace_.path(file));
+            }
+        }
+    }
+
+    void render_insertion() {
+        const Scene labelled = scene();
+        Insertion insertion;
+        if (options_.at) {
+            insertion = place_on_surface(options_.insertion, *options_.at, labelled,
+                                         scan().support_plane.normal);
+        } else {
+            insertion = read_insertion(options_.insertion);
+        }
+        for (const std::string& note : insertion.notes) result_.warnings.push_back(note);
+        std::vector<std::size_t> frames;
+        if (insertion.frames.empty()) {
+            for (std::size_t i = 0; i < capture_.frames.size(); ++i) frames.push_back(i);
+        }
+        for (const std::string& id : insertion.frames) frames.push_back(frame_index(id));
+
+        const Scene real = read_scene(workspace_.path("40_scene/scene.json"));
+        DifferentialOptions render;
+        render.seed = options_.seed;
+        if (options_.quality == RenderQuality::Preview) {
+            render.min_samples = 8;
+            render.max_samples = 32;
+            render.photon_count = 500'000;
+        }
+        if (options_.photon_count > 0) render.photon_count = options_.photon_count;
+        std::vector<Camera> cameras;
+        for (const std::size_t i : frames) cameras.push_back(labelled.cameras[i]);
+        const Progress progress = progress_("insert");
+        const DifferentialRenderer renderer(real, insertion.objects, cameras, render,
+                                            progress.part(0.0, 0.2));
+        fs::remove_all(workspace_.path("50_insert"));
+        fs::remove_all(workspace_.path("60_composite"));
+        Json list = Json::array();
+        for (std::size_t k = 0; k < frames.size(); ++k) {
+            const double begin =
+                0.2 + 0.8 * static_cast<double>(k) / static_cast<double>(frames.size());
+            const double end =
+                0.2 + 0.8 * static_cast<double>(k + 1) / static_cast<double>(frames.size());
+            const RgbdFrame& frame = capture_.frames[frames[k]];
+            write_frame(frame, cameras[k], renderer.render(cameras[k], progress.part(begin, end)));
+            list.push_back({{"id", frame.id}, {"camera", to_json(cameras[k])}});
+        }
+        write_json_file(workspace_.path("60_composite/frames.json"), Json({{"frames", list}}));
+    }
+
+    void write_frame(const RgbdFrame& frame, const Camera& camera, const DifferentialImage& image) {
+        ExrWriteOptions whole;
+        whole.half = false;
+        write_exr(workspace_.path("50_insert/" + frame.id + "_with.exr"), image.with, whole);
+        write_exr(workspace_.path("50_insert/" + frame.id + "_without.exr"), image.without, whole);
+        const ImageRgb picture = composite(frame.colour, image);
+        const double white = capture_.saturation_level < 1e20 ? capture_.saturation_level : 1.0;
+        const std::string base = "60_composite/" + frame.id;
+        write_composite_exr(workspace_.path(base + ".exr"), frame.colour, image, camera,
+                            {.seed = options_.seed});
+        write_composite_png(workspace_.path(base + ".png"), picture, white);
+        write_composite_png(workspace_.path(base + "_plate.png"), frame.colour, white);
+    }
+
+    std::size_t frame_index(const std::string& id) const {
+        std::vector<std::string> ids;
+        for (std::size_t i = 0; i < capture_.frames.size(); ++i) {
+            if (capture_.frames[i].id == id) return i;
+            ids.push_back(capture_.frames[i].id);
+        }
+        throw InputError({options_.insertion.string(),
+                          "frames of the capture (" + join(ids, " ") + ")", "\"" + id + "\"", ""});
+    }
+
+    Scan scan() const { return read_scan(workspace_.path("10_scan"), capture_); }
+    Scene scene() const {
+        return build_scene(scan(), read_candidates(workspace_.path("20_candidates"), capture_));
+    }
+
+    Workspace& workspace_;
+    InsertionRunOptions options_;
+    StageProgress progress_;
+    std::string capture_hash_;
+    Capture capture_;
+    std::string identity_;
+    InsertionRunResult result_;
+};
+
+}  // namespace
+
+InsertionRunResult run_insertion(const fs::path& capture_folder, Workspace& workspace,
+                                 const InsertionRunOptions& options, InsertionStage last,
+                                 const StageProgress& progress) {
+    return InsertionRun(capture_folder, workspace, options, progress).run(last);
+}
+
+}  // namespace vitrine
