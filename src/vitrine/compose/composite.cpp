@@ -7,6 +7,10 @@ namespace vitrine {
 
 namespace {
 
+/// Where the photo is this much brighter than the model, something else shines there (a highlight,
+/// a caustic the model lacks) that the shadow says nothing about.
+constexpr float kMaxShare = 2.0f;
+
 ImageRgb compose_fitted(const ImageRgb& plate, const DifferentialImage& difference) {
     ImageRgb picture(plate.width(), plate.height());
     const ImageRgb delta = difference.delta();
@@ -20,6 +24,11 @@ ImageRgb compose_fitted(const ImageRgb& plate, const DifferentialImage& differen
 
 DifferentialImage fitted_to_plate(const ImageRgb& plate, DifferentialImage difference) {
     VITRINE_CHECK(plate.same_size(difference.coverage));
+    for (std::size_t i = 0; i < plate.size(); ++i) {
+        const Rgb share = (plate[i] / difference.without[i].max(1e-6f)).max(0.0f).min(kMaxShare);
+        Rgb& shadow = difference.shadow[i];
+        shadow = (shadow < 0).select(shadow * share, shadow);
+    }
     const ImageRgb delta = difference.delta();
     for (std::size_t i = 0; i < plate.size(); ++i) {
         difference.shadow[i] += (-(plate[i] + delta[i])).max(0.0f);

@@ -7,8 +7,10 @@
 
 namespace vitrine {
 
-/// Raises the shadow layer where plate + delta would be negative: a model that is too bright must
-/// not take away more light than the camera saw.
+/// Scales what a shadow takes away by plate / without, since it takes a share of the light that is
+/// really there: noise and texture of the photo fade in shadow as they do in the world, and a model
+/// that is too bright does not darken too much. Where plate + delta would still be negative, the
+/// shadow layer makes up for it.
 DifferentialImage fitted_to_plate(const ImageRgb& plate, DifferentialImage difference);
 
 /// (1 - coverage) * (plate + delta) + object, linear, of the fitted difference.

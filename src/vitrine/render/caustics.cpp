@@ -13,6 +13,7 @@ constexpr float kFaintBranchBoost = 4.0f;
 constexpr float kSurePower = 0.25f;
 constexpr float kSoftRadiusFactor = 4.0f;
 constexpr float kWideRadiusFactor = 8.0f;
+constexpr float kNearFactor = 16.0f;
 constexpr float kMergeShare = 0.3f;  // of the gather radius
 
 struct Target {
@@ -178,6 +179,7 @@ class Tracer {
             photon.power = flight.power;
             photon.to_light = PackedDirection(-flight.direction);
             photon.normal = PackedDirection(point.geometric_normal);
+            photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
             photon.views = static_cast<std::uint8_t>(view);
             photon.is_glossy = flight.is_glossy;
             photon.keeps_direction = has_lobe;
@@ -323,7 +325,17 @@ CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather
     maps.soft = PhotonGrid(soft, soft_radius);
     sharp.insert(sharp.end(), soft.begin(), soft.end());
     for (Photon& photon : sharp) photon.keeps_direction = false;
-    maps.wide = PhotonGrid(merge_photons(sharp, kMergeShare * wide_radius), wide_radius);
+    const std::vector<Photon> merged = merge_photons(sharp, kMergeShare * wide_radius);
+    maps.wide = PhotonGrid(merged, wide_radius);
+    std::vector<double> weights;
+    for (const Photon& photon : merged) {
+        const Rgb flux = photon.power * photon.diffuse_albedo();
+        if (!(flux > 0).any()) continue;
+        maps.secondary.push_back({photon.position, photon.normal.unpack(), flux, photon.views});
+        weights.push_back(luminance(flux));
+    }
+    if (!weights.empty()) maps.secondary_choice.emplace(weights);
+    maps.near_m = kNearFactor * radius;
     return maps;
 }
 

@@ -11,6 +11,8 @@
 #include "render/photon_grid.h"
 #include "render/render_scene.h"
 
+#include <optional>
+
 namespace vitrine {
 
 struct CausticOptions {
@@ -41,12 +43,25 @@ struct CausticPhotons {
 CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& options,
                               const Progress& progress = {});
 
+/// A patch of a caustic that scatters light on (Keller 1997, "Instant radiosity").
+struct SecondaryLight {
+    Vec3f position = Vec3f::Zero();
+    Vec3f normal = Vec3f::Zero();
+    Rgb flux = Rgb::Zero();  ///< reflected diffusely, W
+    std::uint8_t views = 3;
+};
+
 /// Photons made ready for look-up: sharp ones with the radius asked for, soft ones (glossy lobes)
-/// with four times that, and all of them with a wide radius for light that is scattered on.
+/// with four times that. Light that a caustic scatters on to other surfaces comes from `secondary`
+/// lights when these are farther than `near_m`, and nearer by from paths that find the `wide` map:
+/// paths alone would meet a small bright spot too seldom, and lights too near are too bright.
 struct CausticMaps {
     PhotonGrid sharp;
     PhotonGrid soft;
     PhotonGrid wide;
+    std::vector<SecondaryLight> secondary;
+    std::optional<DiscreteDistribution> secondary_choice;
+    float near_m = 0.0f;
     bool empty() const { return sharp.empty() && soft.empty(); }
 };
 CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather_radius_m);

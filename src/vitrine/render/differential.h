@@ -15,8 +15,8 @@ namespace vitrine {
 
 struct DifferentialOptions {
     int min_samples = 16;   ///< paths per pixel everywhere, enough to see where work is needed
-    int max_samples = 384;  ///< paths per pixel where the change is noisy
-    double noise_target = 0.006;  ///< standard error per pixel, of the picture's mean luminance
+    int max_samples = 128;  ///< paths per pixel where the change is noisy
+    double noise_target = 0.008;  ///< standard error per pixel, of the picture's mean luminance
     std::uint64_t photon_count = 3'000'000;
     double gather_radius_m = 0;  ///< 0: half the width of a pixel (see `pixel_radius`)
     PathOptions paths;

@@ -11,6 +11,7 @@ constexpr int kScatterUse = 2;
 constexpr int kLobeUse = 3;
 constexpr int kPickUse = 4;
 constexpr int kRouletteUse = 5;
+constexpr int kSecondaryUse = 15;
 constexpr int kLightUse = 6;  // and one more per light
 
 /// A branch of a split ray fainter than this is left to chance.
@@ -32,9 +33,10 @@ struct PathTracer::State {
     /// Light met now is known from the photons of the last receiver.
     bool is_covered = false;
     Layer layer = Layer::Shadow;
-    bool is_layer_fixed = false;  // seen by way of a reflection or refraction
-    bool is_from_first = false;   // left the surface seen by its diffuse lobe
-    float pdf = 0;                // of `direction` at the last receiver; 0 for single directions
+    bool is_layer_fixed = false;      // seen by way of a reflection or refraction
+    bool is_from_first = false;       // left the surface seen by its diffuse lobe
+    bool is_diffuse_segment = false;  // straight from a receiver's diffuse lobe
+    float pdf = 0;  // of `direction` at the last receiver; 0 for single directions
     Vec3f receiver = Vec3f::Zero();
 };
 
@@ -88,6 +90,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
             state.direction = mirror_direction(point, state.direction);
             state.origin = scene_.leave(point, state.direction);
             state.pdf = 0;
+            state.is_diffuse_segment = false;
             state.is_covered |= state.has_receiver && caustics_;
             if (!state.is_layer_fixed && !state.has_receiver) {
                 state.layer = Layer::Reflection;
@@ -107,6 +110,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
         if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
             return;
         }
+        add_secondary(state, point, bsdf, sampler, view, result);
         if (!scatter(state, point, bsdf, frame, wo, sampler)) return;
     }
 }
@@ -174,7 +178,7 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
     }
     const Vec3f origin = scene_.leave_smooth(point);
     for (std::size_t i = begin; i < end; ++i) {
-        const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 9) : 0);
+        const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
         const auto s = lights.sample(i, origin, sampler.pair(state.depth, use));
         if (!s) continue;
         const Vec3f wi = frame.to_local(s->direction);
@@ -205,6 +209,9 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
                               const Frame& frame, const Vec3f& wo, std::uint32_t view,
                               PathResult& result) const {
     if (!caustics_ || caustics_->empty()) return;
+    if (state.is_diffuse_segment && (point.position - state.receiver).norm() >= caustics_->near_m) {
+        return;  // known from the secondary lights
+    }
     const std::uint8_t wanted =
         static_cast<std::uint8_t>(view == kAllParts ? kVirtualParts : kRealParts);
     Rgb irradiance = Rgb::Zero(), glossy = Rgb::Zero();
@@ -230,6 +237,34 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
     result.layers[static_cast<std::size_t>(layer)] += state.throughput * reflected;
 }
 
+void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                               const PathSampler& sampler, std::uint32_t view,
+                               PathResult& result) const {
+    if (!caustics_ || !caustics_->secondary_choice) return;
+    float u = sampler.number(state.depth, kSecondaryUse);
+    const std::size_t index = caustics_->secondary_choice->sample(u);
+    const SecondaryLight& light = caustics_->secondary[index];
+    const Vec3f origin = scene_.leave_smooth(point);
+    const Vec3f to_light = light.position + scene_.epsilon() * light.normal - origin;
+    const float distance = to_light.norm();
+    if (distance < caustics_->near_m) return;
+    const Vec3f direction = to_light / distance;
+    const float cos_here = direction.dot(point.shading_normal);
+    const float cos_there = -direction.dot(light.normal);
+    if (cos_here <= 0 || cos_there <= 0 || direction.dot(point.geometric_normal) <= 0) return;
+    const Rgb value = eval_lobe(bsdf, Lobe::Diffuse, Vec3f(0, 0, 1), Vec3f(0, 0, 1));
+    if (!(value > 0).any()) return;
+    if (is_hidden({origin, direction, 0.0f, distance * (1 - 1e-4f), view}, view, result)) return;
+    if (view == kAllParts) result.is_touched |= light.views != kAllParts;
+    const auto wanted = static_cast<std::uint8_t>(view == kAllParts ? kVirtualParts : kRealParts);
+    if (!(light.views & wanted)) return;
+    const auto probability = static_cast<float>(caustics_->secondary_choice->probability(index));
+    const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
+    const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
+    result.layers[static_cast<std::size_t>(layer)] +=
+        state.throughput * value * light.flux * geometry;
+}
+
 bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf,
                          const Frame& frame, const Vec3f& wo, const PathSampler& sampler) const {
     const BsdfSample s = sample(bsdf, wo, sampler.pair(state.depth, kScatterUse),
@@ -247,6 +282,7 @@ bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bs
     const bool goes_on_covered = s.lobe == Lobe::Glossy && !was_seen && caustics_;
     state.is_covered = goes_on_covered;
     state.pdf = goes_on_covered ? 0.0f : s.pdf;
+    state.is_diffuse_segment = s.lobe == Lobe::Diffuse;
     state.is_from_first = was_seen && s.lobe == Lobe::Diffuse;
     state.has_receiver = true;
     state.is_first_receiver = false;
@@ -277,6 +313,7 @@ bool PathTracer::pass_interface(State& state, const ShadingPoint& point, Pending
     reflected.origin = scene_.leave(point, reflected.direction);
     for (State* branch : {&reflected, &refracted}) {
         branch->pdf = 0;
+        branch->is_diffuse_segment = false;
         branch->is_covered |= state.has_receiver && caustics_;
         if (!state.is_layer_fixed && !state.has_receiver) {
             branch->layer = branch == &reflected ? Layer::Reflection : Layer::Refraction;

@@ -67,6 +67,7 @@ std::vector<Photon> merge_photons(const std::vector<Photon>& photons, float cell
     };
     std::vector<Photon> merged;
     std::vector<Vec3> moment;  // position weighted by power
+    std::vector<Rgb> albedo;
     std::vector<double> weight;
     std::unordered_map<Key, std::uint32_t, KeyHash> index;
     index.reserve(photons.size() / 4 + 16);
@@ -75,6 +76,7 @@ std::vector<Photon> merge_photons(const std::vector<Photon>& photons, float cell
         if (photon.keeps_direction) {
             merged.push_back(photon);
             moment.push_back(photon.position.cast<double>() * w);
+            albedo.push_back(photon.diffuse_albedo() * static_cast<float>(w));
             weight.push_back(w);
             continue;
         }
@@ -89,16 +91,19 @@ std::vector<Photon> merge_photons(const std::vector<Photon>& photons, float cell
         if (is_new) {
             merged.push_back(photon);
             moment.push_back(photon.position.cast<double>() * w);
+            albedo.push_back(photon.diffuse_albedo() * static_cast<float>(w));
             weight.push_back(w);
         } else {
             const std::uint32_t i = found->second;
             merged[i].power += photon.power;
             moment[i] += photon.position.cast<double>() * w;
+            albedo[i] += photon.diffuse_albedo() * static_cast<float>(w);
             weight[i] += w;
         }
     }
     for (std::size_t i = 0; i < merged.size(); ++i) {
         merged[i].position = (moment[i] / weight[i]).cast<float>();
+        merged[i].set_diffuse_albedo(albedo[i] / static_cast<float>(weight[i]));
     }
     return merged;
 }

@@ -3,6 +3,7 @@
 
 #include "math/vector.h"
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -16,19 +17,28 @@ struct PackedDirection {
     Vec3f unpack() const;
 };
 
-/// 36 bytes.
+/// 40 bytes.
 struct Photon {
     Vec3f position = Vec3f::Zero();
-    Rgb power = Rgb::Zero();       ///< W
-    PackedDirection to_light;      ///< where it came from, away from the surface
-    PackedDirection normal;        ///< geometric, on the side it arrived
+    Rgb power = Rgb::Zero();                  ///< W
+    PackedDirection to_light;                 ///< where it came from, away from the surface
+    PackedDirection normal;                   ///< geometric, on the side it arrived
+    std::array<std::uint8_t, 3> albedo = {};  ///< diffuse, of the receiver, in 1/255
     std::uint8_t views = 3;        ///< scenes in which it arrives: kRealParts | kVirtualParts bits
     bool is_glossy = false;        ///< bent by a glossy lobe somewhere: its pattern is soft
     bool keeps_direction = false;  ///< the receiver is not Lambertian
+
+    Rgb diffuse_albedo() const { return Rgb(albedo[0], albedo[1], albedo[2]) / 255.0f; }
+    void set_diffuse_albedo(const Rgb& value) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            const float code = 255.0f * value[static_cast<int>(c)] + 0.5f;
+            albedo[c] = static_cast<std::uint8_t>(code < 255.0f ? code : 255.0f);
+        }
+    }
 };
 
 /// Photons sorted into cells of twice the gather radius. Building is linear in the count; memory is
-/// 36 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
+/// 40 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
 class PhotonGrid {
   public:
     PhotonGrid() = default;

@@ -1,0 +1,277 @@
+// vitrine_render_quality: renders the true scene of a synthetic capture, with and without its
+// virtual object, and compares with the pictures that another renderer made of it.
+#include "base/json_reader.h"
+#include "base/timer.h"
+#include "compose/composite.h"
+#include "image/colour.h"
+#include "image/filter.h"
+#include "image/image_io.h"
+#include "render_truth.h"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+namespace vitrine {
+namespace {
+namespace fs = std::filesystem;
+
+struct Options {
+    std::string capture;
+    std::string insert = "insert";
+    std::string out;
+    int samples = 64;
+    double crease_deg = kCreaseDeg;
+    DifferentialOptions differential;
+};
+
+Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
+
+/// Clipped as the camera does and blurred, then with - without.
+ImageRgb measured_difference(const ImageRgb& with, const ImageRgb& without, float top) {
+    ImageRgb d(with.width(), with.height());
+    for (std::size_t i = 0; i < d.size(); ++i) {
+        d[i] = clipped(with[i], top) - clipped(without[i], top);
+    }
+    return gaussian_blur(d, 2.0);
+}
+
+struct RegionError {
+    double error = 0, floor = 0;
+    std::size_t count = 0;
+};
+
+template <typename Inside>
+RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double noise_rms,
+                         const Inside& inside) {
+    double difference = 0, power = 0;
+    RegionError result;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        if (!inside(i)) continue;
+        difference += (estimate[i] - truth[i]).square().sum();
+        power += truth[i].square().sum();
+        ++result.count;
+    }
+    if (power > 0) {
+        result.error = std::sqrt(difference / power);
+        result.floor = noise_rms * std::sqrt(3.0 * static_cast<double>(result.count) / power);
+    }
+    return result;
+}
+
+/// Root mean square of the true difference where the estimate says that nothing changed.
+double noise_rms(const ImageRgb& truth, const ImageRgb& estimate, double level) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        if (estimate[i].abs().maxCoeff() > 0.002 * level) continue;
+        sum += truth[i].square().sum();
+        count += 3;
+    }
+    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+}
+
+void write_triptych(const fs::path& path, const std::vector<ImageRgb>& images, double scale) {
+    int width = 0;
+    for (const ImageRgb& image : images) width += image.width();
+    ImageRgb all(width, images.front().height());
+    int x0 = 0;
+    for (const ImageRgb& image : images) {
+        for (int y = 0; y < image.height(); ++y) {
+            for (int x = 0; x < image.width(); ++x) all(x0 + x, y) = image(x, y);
+        }
+        x0 += image.width();
+    }
+    write_composite_png(path, all, scale);
+}
+
+Mask all_special(const fs::path& folder, const std::string& frame, const Camera& camera) {
+    Mask mask(camera.width, camera.height);
+    if (!fs::exists(folder / "mask")) return mask;
+    for (const auto& entry : fs::directory_iterator(folder / "mask")) {
+        if (entry.path().filename().string().starts_with(frame)) {
+            mask = mask_or(mask, read_mask(entry.path()));
+        }
+    }
+    return mask;
+}
+
+void compare_plain(const Options& options, const TruthScene& truth, const RenderScene& scene,
+                   const CausticMaps& maps) {
+    const fs::path folder = fs::path(options.capture) / "truth";
+    for (const Camera& camera : truth.scene.cameras) {
+        const fs::path file = folder / "linear" / (camera.id + ".exr");
+        if (!fs::exists(file)) continue;
+        const ImageRgb reference = read_exr_rgb(file);
+        FinalOptions final_options;
+        final_options.samples_per_pixel = options.samples;
+        Timer timer;
+        const RenderedImage image = render_image(scene, camera, &maps, final_options);
+        const double seconds = timer.seconds();
+        const Mask special = dilate(all_special(folder, camera.id, camera), 4);
+        const double level = truth.direct_level / kPi;  // of a white surface
+        double sum = 0, bias = 0;
+        std::size_t count = 0;
+        double flux = 0, flux_true = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
+        std::size_t bright = 0;
+        const Geometry geometry = render_geometry(scene, camera);
+        for (std::size_t i = 0; i < reference.size(); ++i) {
+            if (special[i] > 127) continue;
+            const double albedo = std::max(0.02f, geometry.albedo[i][1]);
+            const double a = image.radiance[i][1], b = reference[i][1];
+            const double direct = level * albedo;
+            if (b > 1.5 * direct) {
+                ++bright;
+                flux += a;
+                flux_true += b;
+                const double x = std::log1p(a / direct), y = std::log1p(b / direct);
+                sx += x;
+                sy += y;
+                sxx += x * x;
+                syy += y * y;
+                sxy += x * y;
+            } else if (b > 0.05 * direct && b < 1.2 * direct) {
+                sum += std::abs(a - b) / b;
+                bias += (a - b) / b;
+                ++count;
+            }
+        }
+        const double n = static_cast<double>(std::max<std::size_t>(1, bright));
+        const double correlation =
+            (sxy - sx * sy / n) /
+            std::sqrt(std::max(1e-30, (sxx - sx * sx / n) * (syy - sy * sy / n)));
+        std::printf(
+            "%s plain: mean relative error %.4f bias %+.4f (%zu px)  caustic flux %.4f "
+            "correlation %.4f (%zu px)  %.1f s\n",
+            camera.id.c_str(), sum / std::max<double>(1, double(count)),
+            bias / std::max<double>(1, double(count)), count, flux / std::max(1e-30, flux_true),
+            correlation, bright, seconds);
+        if (!options.out.empty()) {
+            write_triptych(fs::path(options.out) / (camera.id + "_plain.png"),
+                           {image.radiance, reference}, truth.linear_scale);
+            write_exr(fs::path(options.out) / (camera.id + "_plain.exr"), image.radiance);
+        }
+        std::fflush(stdout);
+    }
+}
+
+void compare_insertion(const Options& options, const TruthScene& truth) {
+    const fs::path folder = fs::path(options.capture) / "truth" / options.insert;
+    if (!fs::exists(folder / "insert.json")) return;
+    std::vector<Camera> cameras;
+    for (const Camera& camera : truth.scene.cameras) {
+        if (fs::exists(folder / (camera.id + "_with.exr"))) cameras.push_back(camera);
+    }
+    Timer timer;
+    const DifferentialRenderer renderer(truth.scene, {read_truth_insert(folder)}, cameras,
+                                        options.differential);
+    std::printf("%s: photons %.1f s, met %.3f\n", options.insert.c_str(), timer.seconds(),
+                static_cast<double>(renderer.photon_balance().met) /
+                    static_cast<double>(renderer.photon_balance().shot));
+    for (const Camera& camera : cameras) {
+        const ImageRgb plate = read_exr_rgb(folder / ".." / "linear" / (camera.id + ".exr"));
+        const ImageRgb with = read_exr_rgb(folder / (camera.id + "_with.exr"));
+        timer = Timer();
+        const DifferentialImage image = renderer.render(camera);
+        const double seconds = timer.seconds();
+        const auto top = static_cast<float>(truth.linear_scale);
+        const ImageRgb d_true = measured_difference(with, plate, top);
+        const ImageRgb d_render = measured_difference(image.with, image.without, top);
+        const ImageRgb picture = composite(plate, image);
+        const ImageRgb d_composite = measured_difference(picture, plate, top);
+        double level = 0;
+        for (const Rgb& p : plate) level += clipped(p, top).mean();
+        level /= static_cast<double>(plate.size());
+        const Mask virtual_mask = read_mask(folder / (camera.id + "_virtual_mask.png"));
+        const Mask object = erode(virtual_mask, 2), around = dilate(virtual_mask, 4);
+        const double noise = noise_rms(d_true, d_render, level);
+        const auto is_changed = [&](std::size_t i) {
+            return around[i] < 128 && d_true[i].abs().maxCoeff() > 0.02 * level;
+        };
+        for (const auto* d : {&d_render, &d_composite}) {
+            // Glints of the lamp in glass are a few saturated pixels, undersampled in the truth.
+            const auto is_glint = [&](std::size_t i) {
+                return std::max(with[i].maxCoeff(), image.with[i].maxCoeff()) > top;
+            };
+            Mask glints(plate.width(), plate.height());
+            for (std::size_t i = 0; i < glints.size(); ++i) glints[i] = is_glint(i) ? 255 : 0;
+            const Mask near_glint = dilate(glints, 6);
+            const RegionError calm = region_error(d_true, *d, noise, [&](std::size_t i) {
+                return object[i] > 127 && near_glint[i] < 128;
+            });
+            const RegionError e[4] = {
+                region_error(d_true, *d, noise, [&](std::size_t i) { return object[i] > 127; }),
+                region_error(d_true, *d, noise,
+                             [&](std::size_t i) { return is_changed(i) && d_true[i].sum() < 0; }),
+                region_error(d_true, *d, noise,
+                             [&](std::size_t i) { return is_changed(i) && d_true[i].sum() > 0; }),
+                region_error(d_true, *d, noise, [&](std::size_t) { return true; })};
+            std::printf(
+                "%s %s %s:  object %.3f (floor %.3f, off glints %.3f)  darker %.3f (%.3f)  "
+                "brighter %.3f "
+                "(%.3f)  all %.3f (%.3f)  %.1f s\n",
+                camera.id.c_str(), options.insert.c_str(),
+                d == &d_render ? "rendered " : "composite", e[0].error, e[0].floor, calm.error,
+                e[1].error, e[1].floor, e[2].error, e[2].floor, e[3].error, e[3].floor, seconds);
+        }
+        std::fflush(stdout);
+        if (options.out.empty()) continue;
+        const fs::path out = options.out;
+        const std::string stem = camera.id + "_" + options.insert;
+        write_triptych(out / (stem + ".png"), {picture, with}, truth.linear_scale);
+        ImageRgb error(plate.width(), plate.height());
+        for (std::size_t i = 0; i < error.size(); ++i) {
+            error[i] = 0.5f * top + 4.0f * (d_composite[i] - d_true[i]);
+        }
+        write_triptych(out / (stem + "_error.png"), {error}, truth.linear_scale);
+        write_composite_exr(out / (stem + ".exr"), plate, image, camera);
+    }
+}
+
+int run(int argc, char** argv) {
+    Options options;
+    bool skip_plain = false;
+    CLI::App app("Compare our renders of a capture's true scene with its true pictures");
+    app.add_option("capture", options.capture, "Capture folder with truth/")->required();
+    app.add_option("--insert", options.insert, "Folder of the insertion's truth");
+    app.add_option("--out", options.out, "Write pictures here");
+    app.add_option("--samples", options.samples, "Samples per pixel of the plain renders");
+    app.add_option("--photon-count", options.differential.photon_count, "Photons shot");
+    app.add_option("--noise-target", options.differential.noise_target, "See DifferentialOptions");
+    app.add_option("--max-samples", options.differential.max_samples, "See DifferentialOptions");
+    app.add_option("--crease-deg", options.crease_deg, "Smooth the real parts below this angle");
+    app.add_flag("--skip-plain", skip_plain, "Insertion alone");
+    CLI11_PARSE(app, argc, argv);
+    if (!options.out.empty()) fs::create_directories(options.out);
+    const TruthScene truth = read_truth(options.capture, options.crease_deg);
+    if (!skip_plain) {
+        const RenderScene scene(truth.scene);
+        CausticOptions caustics;
+        caustics.photon_count = options.differential.photon_count;
+        caustics.gather_radius_m = pixel_radius(scene, truth.scene.cameras.front());
+        Timer timer;
+        const CausticPhotons photons = trace_caustics(scene, caustics);
+        std::printf("photons: shot %llu met %llu stored %zu  %.2f s; radius %.2f mm\n",
+                    static_cast<unsigned long long>(photons.balance.shot),
+                    static_cast<unsigned long long>(photons.balance.met), photons.photons.size(),
+                    timer.seconds(), 1e3 * caustics.gather_radius_m);
+        const CausticMaps maps = build_caustic_maps(photons.photons, caustics.gather_radius_m);
+        std::printf("maps: sharp %zu soft %zu wide %zu  %.2f s\n", maps.sharp.size(),
+                    maps.soft.size(), maps.wide.size(), timer.seconds());
+        compare_plain(options, truth, scene, maps);
+    }
+    compare_insertion(options, truth);
+    return 0;
+}
+
+}  // namespace
+}  // namespace vitrine
+
+int main(int argc, char** argv) {
+    try {
+        return vitrine::run(argc, argv);
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "%s\n", error.what());
+        return 1;
+    }
+}
