@@ -61,13 +61,9 @@ class PathTracer {
     void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                       const Frame& frame, const Vec3f& wo, std::uint32_t view,
                       PathResult& result) const;
-<<<<<<< HEAD
-    bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
-=======
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                        const PathSampler& sampler, std::uint32_t view, PathResult& result) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
->>>>>>> 0a3361e (feat(render): light scattered on by caustics; benchmark against captures of known truth)
                  const Vec3f& wo, const PathSampler& sampler) const;
     bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,
                         const PathSampler& sampler) const;
