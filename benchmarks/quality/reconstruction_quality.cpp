@@ -1,7 +1,8 @@
-// vitrine_reconstruction_quality [--out DIR] [--only scan|objects|poses|track] CAPTURE...
+// vitrine_reconstruction_quality [--out DIR] [--only objects|poses] [--threads N] [--verbose] CAPTURE...
 //
 // Prints, for captures with a truth/ folder, how far the reconstruction is from the truth: fused
 // surface, objects, silhouettes, hulls, poses. The library itself never reads truth/.
+#include "base/log.h"
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "base/timer.h"
@@ -276,6 +277,8 @@ int main(int argc, char** argv) {
             out = argv[++i];
         } else if (argument == "--only" && i + 1 < argc) {
             only = argv[++i];
+        } else if (argument == "--verbose") {
+            vitrine::set_log_level(vitrine::LogLevel::Debug);
         } else if (argument == "--threads" && i + 1 < argc) {
             vitrine::set_thread_count(std::atoi(argv[++i]));
         } else {

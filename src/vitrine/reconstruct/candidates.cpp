@@ -3,6 +3,7 @@
 #include "base/log.h"
 #include "image/filter.h"
 #include "reconstruct/candidate_views.h"
+#include "reconstruct/revolution.h"
 #include "reconstruct/visual_hull.h"
 #include "reconstruct/vote_grid.h"
 #include "trace/depth_map.h"
@@ -27,6 +28,7 @@ struct Growing {
     std::vector<BodyImage> images;  ///< of the body, per view
     std::vector<SilhouetteView> views;
     std::vector<Mask> silhouettes;
+    std::vector<Mask> hidden;  ///< of the round that drew the silhouettes
     std::vector<OutlineView> outlines;
 };
 
@@ -179,22 +181,109 @@ void draw_outlines(const SceneViews& views, const std::vector<Growing>& all, dou
 
 void carve_body(const SceneViews& views, double spacing_m, Growing& object) {
     object.outlines.clear();
+    object.hidden.clear();
     for (std::size_t i = 0; i < views.count(); ++i) {
         object.outlines.push_back(
             outline_view(views.scan->cameras[i], object.silhouettes[i], object.images[i].hidden));
+        object.hidden.push_back(object.images[i].hidden);
     }
     object.body = carve(object.outlines, grown(object.cluster.box, kMargin_m), spacing_m);
 }
 
-Candidate finish(const SceneViews& views, const Growing& object) {
+/// How the outlines of a body lie to those of the silhouettes: differing area over the length of
+/// the outline, in pixels.
+struct OutlineResidual {
+    double absolute_px = 1e9;
+    double signed_px = 0.0;  ///< positive: the body is too large
+};
+
+OutlineResidual outline_residual(const Growing& object) {
+    double too_large = 0, too_small = 0, length = 0;
+    for (std::size_t i = 0; i < object.images.size(); ++i) {
+        const Mask& silhouette = object.silhouettes[i];
+        if (silhouette.empty()) continue;
+        const Mask rim = erode(silhouette, 1);
+        for (std::size_t p = 0; p < rim.size(); ++p) {
+            if (object.hidden[i][p] > 127 || object.images[i].hidden[p] > 127) continue;
+            const bool is_wanted = silhouette[p] > 127, is_there = object.images[i].depth_m[p] > 0;
+            length += is_wanted && rim[p] < 128 ? 1 : 0;
+            too_large += is_there && !is_wanted ? 1 : 0;
+            too_small += is_wanted && !is_there ? 1 : 0;
+        }
+    }
+    if (length == 0) return {};
+    return {(too_large + too_small) / length, (too_large - too_small) / length};
+}
+
+/// Size of a pixel at the object, mean over the views.
+double pixel_size_m(const SceneViews& views, const Vec3& centre) {
+    double sum = 0;
+    for (const Camera& camera : views.scan->cameras) sum += camera.depth(centre) / camera.fx;
+    return sum / double(views.count());
+}
+
+/// Replaces the body by one of revolution if that explains the silhouettes as well.
+Revolution try_revolution(const SceneViews& views, double hull_residual_px, Growing& object) {
+    constexpr double kMaxExcess_px = 0.3;  // what symmetry may cost: noise of the outlines
+    const Plane& support = views.scan->support_plane;
+    const Mesh hull = hull_mesh(object.body, 0.0, 1.0, support);
+    Revolution result;
+    if (hull.empty()) return result;
+    const Box3 box = bounds(hull);
+    const double radius = 0.6 * box.size().head<2>().maxCoeff() + 0.01;
+    double height = 0;
+    for (const Vec3f& v : hull.vertices) {
+        height = std::max(height, support.height(v.cast<double>()));
+    }
+    const Vec3 foot = find_axis_foot(object.outlines, support, box.centre(), radius, height + 0.01);
+    ProfileField profile = carve_profile(object.outlines, support, foot, radius, height + 0.01,
+                                         0.5 * object.body.spacing_m, 96);
+    const ScalarGrid carved = object.body;
+    const std::vector<BodyImage> images = object.images;
+    // The largest of noisy outlines cuts a little too deep: set right by the area of the outlines.
+    object.body = revolve(profile, support, foot, carved);
+    render(views, kGrowth_m, object);
+    const double excess_m = outline_residual(object).signed_px * pixel_size_m(views, box.centre());
+    for (float& v : profile.values) v += static_cast<float>(excess_m);
+    complete_poles(profile);
+    object.body = revolve(profile, support, foot, carved);
+    render(views, kGrowth_m, object);
+    result.residual_px = outline_residual(object).absolute_px;
+    log_debug("revolution: residual {:.2f} px, hull {:.2f} px, size was off by {:.2f} mm",
+              result.residual_px, hull_residual_px, 1e3 * excess_m);
+    result.is_found = result.residual_px < hull_residual_px + kMaxExcess_px;
+    result.axis_point = foot;
+    result.axis = support.normal;
+    if (!result.is_found) {
+        object.body = carved;
+        object.images = images;
+    }
+    return result;
+}
+
+std::string evidence_of(const Candidate& candidate, std::size_t views) {
+    return fmt::format("{:.0f} % of its pixels have no or wrong depth, agreed by {} views",
+                       100 * candidate.bad_depth_fraction, views);
+}
+
+Candidate finish(const SceneViews& views, const CandidateOptions& options, Growing& object) {
     Candidate candidate;
+    render(views, kGrowth_m, object);
+    candidate.outline_residual_px = outline_residual(object).absolute_px;
+    if (options.use_symmetry) {
+        candidate.revolution = try_revolution(views, candidate.outline_residual_px, object);
+        if (candidate.revolution.is_found) {
+            candidate.outline_residual_px = candidate.revolution.residual_px;
+        }
+    }
     candidate.hull = hull_mesh(object.body, 0.0, 1.0, views.scan->support_plane);
     candidate.box = bounds(candidate.hull);
     candidate.silhouettes = object.silhouettes;
-    std::size_t bad = 0, all = 0;
+    std::size_t bad = 0, all = 0, seen = 0;
     for (std::size_t i = 0; i < views.count(); ++i) {
-        candidate.hidden.push_back(object.images[i].hidden);
+        candidate.hidden.push_back(object.hidden[i]);
         const Mask& mask = object.silhouettes[i];
+        seen += mask.empty() ? 0 : 1;
         for (std::size_t p = 0; p < mask.size(); ++p) {
             if (mask[p] < 128) continue;
             ++all;
@@ -202,6 +291,7 @@ Candidate finish(const SceneViews& views, const Growing& object) {
         }
     }
     candidate.bad_depth_fraction = all > 0 ? double(bad) / double(all) : 0.0;
+    candidate.evidence = evidence_of(candidate, seen);
     return candidate;
 }
 
@@ -244,7 +334,7 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
         hide_behind_each_other(objects);
     }
     for (Growing& object : objects) {
-        Candidate candidate = finish(views, object);
+        Candidate candidate = finish(views, options, object);
         if (!candidate.hull.empty()) result.objects.push_back(std::move(candidate));
     }
     std::stable_sort(

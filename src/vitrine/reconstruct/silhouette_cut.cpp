@@ -129,9 +129,10 @@ Mask cut_one(const SilhouetteView& view, const Cues& cues, double saturation_lev
                                 cues.difference[difference_bin(view, px, py)];
                 }
             }
-            // Near the expected outline the pixels decide; far from it the expectation does.
+            // Near the expected outline the pixels decide; far outside the expectation does. Deep
+            // inside two strong cues together still dig a hole: a ring has one.
             const double away = outline(px, py) / options.outline_slack_px;
-            evidence -= std::clamp(away * std::abs(away), -3.0, 3.0) * 3.0;
+            evidence -= std::clamp(away * std::abs(away), -1.0, 3.0) * 3.0;
             graph.addTermWeights(node, std::max(evidence, 0.0), std::max(-evidence, 0.0));
             const auto link = [&](int dx, int dy, double length) {
                 if (x + dx < 0 || x + dx >= width || y + dy >= height) return;
