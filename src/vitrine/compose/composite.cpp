@@ -26,8 +26,11 @@ DifferentialImage fitted_to_plate(const ImageRgb& plate, DifferentialImage diffe
     VITRINE_CHECK(plate.same_size(difference.coverage));
     for (std::size_t i = 0; i < plate.size(); ++i) {
         const Rgb share = (plate[i] / difference.without[i].max(1e-6f)).max(0.0f).min(kMaxShare);
-        Rgb& shadow = difference.shadow[i];
-        shadow = (shadow < 0).select(shadow * share, shadow);
+        // Light that the object takes away, direct or focused by glass: the photo knows how much of
+        // it there was better than the model.
+        for (Rgb* lost : {&difference.shadow[i], &difference.caustics[i]}) {
+            *lost = (*lost < 0).select(*lost * share, *lost);
+        }
     }
     const ImageRgb delta = difference.delta();
     for (std::size_t i = 0; i < plate.size(); ++i) {
