@@ -1,0 +1,229 @@
+#include "compose/transfer.h"
+
+#include "compose/object_irradiance.h"
+#include "estimate/highlight_light.h"
+#include "image/colour.h"
+#include "image/filter.h"
+#include "image/poisson.h"
+#include "math/statistics.h"
+
+namespace vitrine {
+namespace {
+
+/// White of a picture without clipping: the bright end of the object shows 0.8 encoded.
+double white_of(const Photo& photo) {
+    if (photo.saturation_level < 1e6) return photo.saturation_level;
+    std::vector<double> values;
+    for (std::size_t i = 0; i < photo.mask.size(); ++i)
+        if (photo.mask[i] > 127) values.push_back(luminance(photo.linear[i]));
+    return std::max(quantile(std::move(values), 0.95), 1e-9) / srgb_to_linear(0.8f);
+}
+
+PhotoAnalysis analyse(const Photo& photo, double role_softness,
+                      const TransferAnalysisOptions& options, const Progress& progress) {
+    PhotoAnalysis analysis;
+    analysis.photo = photo;
+    analysis.white = white_of(photo);
+    analysis.warnings = photo.warnings;
+    progress.update(0.0, "highlights");
+    analysis.highlights =
+        find_highlights(photo.linear, photo.mask, photo.saturation_level, options.highlights);
+    progress.update(0.2, "shape");
+    analysis.relief = shade_to_shape(analysis.highlights.diffuse, photo.mask, options.relief);
+    progress.update(0.4, "lights");
+    analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
+    if (options.light_method == LightMethod::LopezMoreno) {
+        analysis.lights = estimate_lopez_moreno_lights(analysis.highlights.diffuse, analysis.relief,
+                                                       analysis.highlights.grown);
+    } else {
+        TranslucencyLightOptions light_options = options.lights;
+        light_options.softness = role_softness;
+        analysis.lights = estimate_translucency_lights(
+            analysis.highlights.diffuse, analysis.relief, analysis.highlights.grown,
+            analysis.highlight_lights, light_options, progress.part(0.4, 1.0));
+    }
+    analysis.warnings.insert(analysis.warnings.end(), analysis.lights.warnings.begin(),
+                             analysis.lights.warnings.end());
+    return analysis;
+}
+
+double encoded_psnr(const ImageRgb& a, const ImageRgb& b, const Mask& mask, const Mask& excluded) {
+    double sum = 0, count = 0;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] <= 127 || excluded[i] > 127) continue;
+        for (int c = 0; c < 3; ++c) {
+            const double d = linear_to_srgb(a[i][c]) - linear_to_srgb(b[i][c]);
+            sum += d * d;
+            count += 1;
+        }
+    }
+    return count == 0 ? 0 : -10 * std::log10(std::max(sum / count, 1e-12));
+}
+
+ImageRgb scaled_image(ImageRgb image, double factor) {
+    for (Rgb& pixel : image) pixel *= static_cast<float>(factor);
+    return image;
+}
+
+}  // namespace
+
+LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& options,
+                             const Progress& progress) {
+    LiftedMaterial lifted;
+    lifted.analysis = analyse(photo, options.softness, options, progress.part(0.0, 0.6));
+    const PhotoAnalysis& analysis = lifted.analysis;
+    const ImageRgb shown = scaled_image(analysis.highlights.diffuse, 1 / analysis.white);
+    lifted.medium =
+        estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, analysis.lights.lights,
+                        options.bssrdf, progress.part(0.6, 0.9));
+
+    TranslucentRenderOptions render_options;
+    render_options.eta = options.bssrdf.eta;
+    const TranslucentRelief renderer(analysis.relief, render_options);
+    lifted.rendered = renderer.render(
+        irradiance_from_lights(analysis.relief, analysis.lights.lights, options.bssrdf.eta),
+        lifted.medium.profile());
+    lifted.self_psnr_db =
+        encoded_psnr(lifted.rendered, shown, photo.mask, analysis.highlights.grown);
+    Rgbd mean = Rgbd::Zero();
+    double count = 0;
+    for (std::size_t i = 0; i < photo.mask.size(); ++i) {
+        if (photo.mask[i] <= 127 || analysis.highlights.grown[i] > 127) continue;
+        for (int c = 0; c < 3; ++c) mean[c] += linear_to_srgb(shown[i][c]);
+        count += 1;
+    }
+    Rgb flat;
+    for (int c = 0; c < 3; ++c)
+        flat[c] = srgb_to_linear(static_cast<float>(mean[c] / std::max(count, 1.0)));
+    lifted.flat_psnr_db = encoded_psnr(ImageRgb(shown.width(), shown.height(), flat), shown,
+                                       photo.mask, analysis.highlights.grown);
+    progress.update(1.0, "material lifted");
+    return lifted;
+}
+
+PhotoAnalysis analyse_object(const Photo& photo, const TransferAnalysisOptions& options,
+                             const Progress& progress) {
+    return analyse(photo, 1 - options.softness, options, progress);
+}
+
+double length_ratio(double source_inradius_px, double target_inradius_px, double source_px_per_m,
+                    double target_px_per_m) {
+    if (source_px_per_m > 0 && target_px_per_m > 0) return target_px_per_m / source_px_per_m;
+    return target_inradius_px / source_inradius_px;
+}
+
+TransferSession::TransferSession(PhotoAnalysis object, IrradianceSource irradiance,
+                                 const TranslucentRenderOptions& options, bool is_object_neutral,
+                                 double object_albedo)
+    : object_(std::move(object)),
+      options_(options),
+      renderer_(std::make_unique<TranslucentRelief>(object_.relief, options)) {
+    const Mask& mask = object_.photo.mask;
+    const ObjectIrradiance found =
+        object_irradiance(object_, irradiance, is_object_neutral, options.eta, object_albedo);
+    irradiance_ = found.irradiance;
+    level_ = found.level;
+    // One pixel wider than the object, with a soft edge: a sharp one leaves a fringe.
+    const Mask wide = dilate(mask, 1);
+    alpha_ = ImageF(mask.width(), mask.height());
+    for (std::size_t i = 0; i < wide.size(); ++i) alpha_[i] = wide[i] > 127 ? 1.0f : 0.0f;
+    alpha_ = gaussian_blur(alpha_, 1.0);
+}
+
+void TransferSession::set_lights(const ViewLights& lights) {
+    object_.lights.lights = lights;
+    irradiance_ = irradiance_from_lights(object_.relief, lights, options_.eta);
+}
+
+ImageRgb TransferSession::highlight_layer(const TransferLook& look) const {
+    const Mask& mask = object_.photo.mask;
+    ImageRgb layer(mask.width(), mask.height());
+    const auto lobe = [&](const Image<Vec3f>& normals, std::size_t i, const Vec3& direction,
+                          double exponent) {
+        const Vec3 half = (direction + Vec3(0, 0, 1)).normalized();
+        const Vec3 n = normals[i].cast<double>();
+        if (n.dot(direction) <= 0) return 0.0;
+        return std::pow(std::max(0.0, n.dot(half)), exponent);
+    };
+    const bool has_highlights = !object_.highlights.blobs.empty();
+    if (has_highlights && look.highlights == HighlightTransfer::Residual) {
+        // The fill beneath meets the picture at the border of the grown set: no seam to feather.
+        for (std::size_t i = 0; i < layer.size(); ++i)
+            layer[i] = object_.highlights.residual[i] * static_cast<float>(look.highlight_gain);
+    } else if (has_highlights) {
+        ImageF gloss(mask.width(), mask.height());
+        for (std::size_t i = 0; i < gloss.size(); ++i)
+            gloss[i] = object_.highlights.core[i] > 127 ? 1.0f : 0.0f;
+        gloss = gaussian_blur(gloss, std::max(1.0, 0.02 * object_.relief.inradius_px));
+        double total = 0;
+        for (const ViewLight& light : object_.lights.lights.lights)
+            total += luminance(light.intensity);
+        for (std::size_t i = 0; i < layer.size(); ++i) {
+            if (mask[i] <= 127 || gloss[i] <= 0) continue;
+            double sum = 0;
+            if (!object_.highlight_lights.empty()) {
+                sum += look.highlight_weight * lobe(object_.relief.normals, i,
+                                                    object_.highlight_lights.front().direction,
+                                                    look.phong_exponent);
+            }
+            for (const ViewLight& light : object_.lights.lights.lights) {
+                sum += (1 - look.highlight_weight) * luminance(light.intensity) / total *
+                       lobe(object_.relief.normals, i, light.direction, look.phong_exponent);
+            }
+            layer[i] = Rgb::Constant(static_cast<float>(sum * look.highlight_gain * object_.white) *
+                                     gloss[i]);
+        }
+    }
+    if (look.added_gloss > 0 && !object_.lights.lights.lights.empty()) {
+        const Vec3 key = object_.lights.lights.lights.front().direction;
+        for (std::size_t i = 0; i < layer.size(); ++i) {
+            if (mask[i] <= 127) continue;
+            layer[i] += Rgb::Constant(static_cast<float>(
+                object_.white * look.added_gloss *
+                lobe(object_.relief.normals, i, key, look.added_gloss_exponent)));
+        }
+    }
+    return layer;
+}
+
+TransferPicture TransferSession::render(const RadialProfile& profile,
+                                        const TransferLook& look) const {
+    const Mask& mask = object_.photo.mask;
+    TransferPicture result;
+    const RadialProfile stretched = look.scale == 1 ? profile : profile.scaled(look.scale);
+    result.diffuse = renderer_->render(irradiance_, stretched);
+    if (look.keep_colour && look.scale != 1) {
+        // Longer paths lose light in a finite body, and unequally per channel.
+        const ImageRgb reference = renderer_->render(irradiance_, profile);
+        Rgbd wanted = Rgbd::Zero(), found = Rgbd::Zero();
+        for (std::size_t i = 0; i < mask.size(); ++i) {
+            wanted += reference[i].cast<double>();
+            found += result.diffuse[i].cast<double>();
+        }
+        const Rgb factor = (wanted / found.max(1e-12)).cast<float>();
+        for (Rgb& pixel : result.diffuse) pixel *= factor;
+    }
+    const auto level = static_cast<float>(level_ * look.exposure);
+    for (Rgb& pixel : result.diffuse) pixel *= level;
+
+    const ImageRgb highlights = highlight_layer(look);
+    ImageRgb object(mask.width(), mask.height());
+    for (std::size_t i = 0; i < mask.size(); ++i) object[i] = result.diffuse[i] + highlights[i];
+    object = extend_nearest(object, mask);
+    result.picture = object_.photo.linear;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (alpha_[i] <= 0) continue;
+        result.picture[i] += alpha_[i] * (object[i] - result.picture[i]);
+    }
+    return result;
+}
+
+ImageRgb lambertian_recolouring(const Relief& relief, const ReliefIrradiance& irradiance,
+                                const Rgbd& albedo) {
+    ImageRgb result(relief.mask.width(), relief.mask.height());
+    for (std::size_t i = 0; i < result.size(); ++i)
+        if (relief.mask[i] > 127) result[i] = irradiance.front[i] * (albedo / kPi).cast<float>();
+    return result;
+}
+
+}  // namespace vitrine

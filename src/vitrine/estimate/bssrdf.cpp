@@ -1,0 +1,203 @@
+#include "estimate/bssrdf.h"
+
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "estimate/distance_histogram.h"
+#include "estimate/profile_fit.h"
+#include "estimate/translucency_lights.h"
+#include "image/filter.h"
+#include "math/statistics.h"
+
+namespace vitrine {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// Gaussian over the usable pixels only: mask without highlights.
+ImageRgb smooth_inside(const ImageRgb& image, const Mask& mask, const Mask& excluded,
+                       double sigma) {
+    ImageRgb weighted(image.width(), image.height());
+    ImageF weight(image.width(), image.height());
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (mask[i] <= 127 || (!excluded.empty() && excluded[i] > 127)) continue;
+        weighted[i] = image[i];
+        weight[i] = 1;
+    }
+    weighted = gaussian_blur(weighted, sigma);
+    weight = gaussian_blur(weight, sigma);
+    for (std::size_t i = 0; i < mask.size(); ++i)
+        weighted[i] = weight[i] > 1e-3f ? (weighted[i] / weight[i]).eval() : image[i];
+    return weighted;
+}
+
+/// Entering irradiance per channel, at samples (times area) and at observations.
+void irradiance_fields(const Relief& relief, const ReliefSamples& samples,
+                       const ReliefObservations& observations, const ViewLights& lights,
+                       const BssrdfOptions& options, Eigen::MatrixXf& source,
+                       Eigen::MatrixXf& local) {
+    source.resize(static_cast<Index>(samples.position.size()), 3);
+    local.resize(static_cast<Index>(observations.position.size()), 3);
+    const auto fill = [&](Eigen::MatrixXf& field, const std::vector<Vec3f>& positions,
+                          const std::vector<Vec3f>& normals) {
+        for (Index i = 0; i < field.rows(); ++i)
+            field.row(i) = lights.ambient.cast<float>().matrix().transpose();
+        for (const ViewLight& light : lights.lights) {
+            std::vector<float> seen(positions.size(), 1.0f);
+            if (options.use_shadows) seen = visibility(relief, positions, normals, light.direction);
+            for (std::size_t i = 0; i < positions.size(); ++i) {
+                const double e =
+                    entering_irradiance(normals[i], light.direction, options.eta) * seen[i];
+                field.row(static_cast<Index>(i)) +=
+                    (light.intensity * e).cast<float>().matrix().transpose();
+            }
+        }
+    };
+    fill(source, samples.position, samples.normal);
+    for (std::size_t i = 0; i < samples.position.size(); ++i)
+        source.row(static_cast<Index>(i)) *= samples.area_px2[i];
+    fill(local, observations.position, observations.normal);
+}
+
+const char* const kChannelNames[3] = {"red", "green", "blue"};
+
+void judge(MediumEstimate& medium, int c, double longest_px, double mean_exitance) {
+    ChannelFit& channel = medium.channels[static_cast<std::size_t>(c)];
+    const TwoExponentials& fit = medium.fit[static_cast<std::size_t>(c)];
+    channel.albedo = fit.total();
+    channel.mean_radius_px = fit.mean_radius();
+    const bool is_long = (fit.a > 0 && -1 / fit.b > 0.98 * longest_px) ||
+                         (fit.c > 0 && -1 / fit.d > 0.98 * longest_px);
+    if (mean_exitance < 0.02) {
+        channel.outcome = Outcome::NotIdentifiable;
+        channel.reason = "the channel is too dark";
+        medium.warnings.push_back(
+            fmt::format("The {} channel is too dark: its hue and scattering are unreliable.",
+                        kChannelNames[c]));
+    } else if (is_long) {
+        channel.outcome = Outcome::AtBound;
+        channel.reason = "the scattering length is a lower bound";
+        medium.warnings.push_back(
+            fmt::format("Very translucent or badly lit: the scattering length of the {} channel is "
+                        "a lower bound.",
+                        kChannelNames[c]));
+    } else if (channel.relative_residual > 0.3) {
+        channel.outcome = Outcome::Ambiguous;
+        channel.reason = "the picture is not that of a homogeneous material";
+        medium.warnings.push_back(fmt::format(
+            "The material is textured ({} channel): its average is used.", kChannelNames[c]));
+    }
+    if (channel.albedo > kDipoleMaxTotal) {
+        if (c == 0 || medium.channels[static_cast<std::size_t>(c - 1)].albedo <= kDipoleMaxTotal) {
+            medium.warnings.push_back(
+                "The material reflects more than a real one can: the material photo is exposed too "
+                "brightly, so no equivalent medium is given.");
+        }
+    } else if (channel.albedo > 1e-4 && channel.mean_radius_px > 0) {
+        medium.dipole[static_cast<std::size_t>(c)] =
+            dipole_from_total_and_mean_radius(channel.albedo, channel.mean_radius_px, medium.eta);
+    }
+}
+
+}  // namespace
+
+RadialProfile MediumEstimate::profile() const {
+    double longest = 1e-9, shortest = 1e30;
+    for (const TwoExponentials& channel : fit) {
+        if (channel.a > 0) {
+            longest = std::max(longest, -1 / channel.b);
+            shortest = std::min(shortest, -1 / channel.b);
+        }
+        if (channel.c > 0) {
+            longest = std::max(longest, -1 / channel.d);
+            shortest = std::min(shortest, -1 / channel.d);
+        }
+    }
+    if (shortest > longest) return tabulate(fit, 0.01, 1.0, 8);  // all black
+    return tabulate(fit, 0.01 * shortest, 16 * longest);
+}
+
+MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                               const ViewLights& lights, const BssrdfOptions& options,
+                               const Progress& progress) {
+    MediumEstimate medium;
+    medium.eta = options.eta;
+    medium.inradius_px = relief.inradius_px;
+    const ReliefObservations observations =
+        draw_observations(relief, excluded, static_cast<std::size_t>(options.pixel_count), 2.0,
+                          0.25, stream_key(options.seed, 0x22));
+    const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
+    Eigen::MatrixXf source, local;
+    irradiance_fields(relief, samples, observations, lights, options, source, local);
+    const DistanceHistogram histogram(observations, samples, source, local);
+    progress.update(0.5, "material: distances");
+
+    const ImageRgb smooth =
+        smooth_inside(diffuse, relief.mask, excluded, options.smoothing * relief.inradius_px);
+    MatrixXd exitance(static_cast<Index>(observations.pixel.size()), 3);
+    for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
+        const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
+        exitance.row(static_cast<Index>(p)) =
+            smooth[observations.pixel[p]].cast<double>().matrix().transpose() *
+            (kPi / fresnel_transmittance(cosine, options.eta));
+    }
+    double inside = 0;
+    for (const std::uint8_t m : relief.mask) inside += m > 127 ? 1 : 0;
+    const double diameter = 2 * std::sqrt(inside / kPi);
+
+    ProfileFitOptions fit_options;
+    fit_options.longest_px = options.longest * diameter;
+    fit_options.shortest_px = 0.5 * samples.step_px;
+    fit_options.extent_px = diameter;
+    fit_options.shell_count = options.shell_count;
+    fit_options.ridge = options.ridge;
+    if (observations.pixel.size() < 50) {
+        for (int c = 0; c < 3; ++c) {
+            medium.channels[static_cast<std::size_t>(c)].outcome = Outcome::NotIdentifiable;
+            medium.channels[static_cast<std::size_t>(c)].reason = "too few usable pixels";
+        }
+        medium.warnings.push_back("Too little of the object is free of highlights and rim.");
+        return medium;
+    }
+
+    std::array<PiecewiseProfile, 3> pieces;
+    for (int c = 0; c < 3; ++c) {
+        const auto k = static_cast<std::size_t>(c);
+        pieces[k] = options.solver == ProfileSolver::Qmr
+                        ? fit_piecewise_qmr(histogram, exitance.col(c), c, fit_options)
+                        : fit_piecewise_monotone(histogram, exitance.col(c), c, fit_options);
+    }
+    const ShellGrid shells = make_shells(samples.step_px, diameter, options.shell_count);
+    for (int k = 0; k < options.shell_count; ++k) {
+        const auto i = static_cast<std::size_t>(k);
+        medium.piecewise.r.push_back(0.5 * (shells.edge[i] + shells.edge[i + 1]));
+        medium.piecewise.rd.push_back(
+            Rgbd(pieces[0].value[k], pieces[1].value[k], pieces[2].value[k]));
+    }
+    progress.update(0.7, "material: step profile");
+
+    if (options.solver == ProfileSolver::Qmr) {
+        for (std::size_t c = 0; c < 3; ++c)
+            medium.fit[c] = fit_exponentials_to_shells(shells, pieces[c].value, fit_options);
+    } else if (options.coupling == ChannelCoupling::Free) {
+        for (int c = 0; c < 3; ++c)
+            medium.fit[static_cast<std::size_t>(c)] =
+                fit_exponentials(histogram, exitance.col(c), c, fit_options);
+    } else {
+        medium.fit = fit_ordered(histogram, exitance, fit_options);
+    }
+    for (int c = 0; c < 3; ++c) {
+        const TwoExponentials& fit = medium.fit[static_cast<std::size_t>(c)];
+        const VectorXd model = histogram.image_of(fit).col(c);
+        const double mean_exitance = exitance.col(c).mean();
+        medium.channels[static_cast<std::size_t>(c)].relative_residual =
+            std::sqrt((model - exitance.col(c)).squaredNorm() / static_cast<double>(model.size())) /
+            std::max(mean_exitance, 1e-9);
+        judge(medium, c, fit_options.longest_px, mean_exitance / kPi);
+    }
+    progress.update(1.0, "material: done");
+    return medium;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,75 @@
+// estimate/bssrdf.h: the diffusion profile R_d of a translucent object from one photograph whose
+// shape and lights are known.
+#pragma once
+
+#include "base/progress.h"
+#include "estimate/estimate.h"
+#include "optics/dipole.h"
+#include "optics/radial_profile.h"
+#include "scene/relief.h"
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace vitrine {
+
+enum class ProfileSolver {
+    Monotone,  ///< profile non-negative and falling by construction; exponentials fitted to the
+               ///< image
+    Qmr,       ///< as published: QMR on the normal equations, exponentials fitted to the steps
+};
+
+enum class ChannelCoupling {
+    Free,     ///< each channel on its own
+    Ordered,  ///< same scattering, different absorption: the darker channel is the narrower one
+};
+
+struct BssrdfOptions {
+    ProfileSolver solver = ProfileSolver::Monotone;
+    ChannelCoupling coupling = ChannelCoupling::Ordered;
+    double eta = 1.3;             ///< relative index, as in the paper
+    int samples_per_side = 3000;  ///< of the surface
+    int pixel_count = 1500;       ///< compared
+    int shell_count = 24;         ///< steps of the piecewise constant profile
+    double longest =
+        1.0 / 3.0;  ///< bound of 1/|b|, in diameters: shape errors look like infinite tails
+    double smoothing = 0.03;  ///< of the picture before the fit, in inradii: removes texture
+    double ridge = 1e-4;      ///< Tikhonov weight of the piecewise profile
+    bool use_shadows = true;  ///< the object's own cast shadows
+    std::uint64_t seed = 1;   ///< of the choice of pixels
+};
+
+struct ChannelFit {
+    double albedo = 0;  ///< integral of R_d
+    double mean_radius_px = 0;
+    double relative_residual = 0;  ///< rms misfit over mean
+    Outcome outcome = Outcome::Converged;
+    std::string reason;
+};
+
+/// Lengths in pixels of the photograph. R_d and the light are only known up to a common factor:
+/// with lights normalised (scene/relief.h) the albedo is the reflectance seen in the picture.
+struct MediumEstimate {
+    RgbExponentials fit;      ///< R_d = a e^{b r} + c e^{d r}, the result
+    RadialProfile piecewise;  ///< the step profile, for diagnosis
+    std::array<ChannelFit, 3> channels;
+    std::array<std::optional<DipoleMedium>, 3> dipole;  ///< per pixel; none where it cannot be one
+    double eta = 1.3;
+    double inradius_px = 1;
+    std::vector<std::string> warnings;
+
+    /// The fit as a table up to where it has died away.
+    RadialProfile profile() const;
+};
+
+/// Munoz et al. 2011, "BSSRDF estimation from single images", with two repairs: the profile is kept
+/// non-negative and falling while it is solved, and the two exponentials are fitted to the image
+/// by variable projection over their lengths, not to the steps (which biases the width by -15 %).
+/// Costs about 0.3 s. `excluded`: highlights.
+MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                               const ViewLights& lights, const BssrdfOptions& options = {},
+                               const Progress& progress = {});
+
+}  // namespace vitrine

@@ -1,0 +1,57 @@
+// estimate/profile_fit.h: radial profiles fitted to observed exitance through a distance histogram.
+#pragma once
+
+#include "estimate/distance_histogram.h"
+#include "optics/radial_profile.h"
+
+#include <vector>
+
+namespace vitrine {
+
+struct ProfileFitOptions {
+    double shortest_px = 1;  ///< bounds of the lengths 1/|b|, 1/|d|
+    double longest_px = 100;
+    double extent_px = 300;  ///< outer edge of the last shell
+    int shell_count = 24;
+    double ridge = 1e-4;
+    int length_count = 40;  ///< grid of lengths, geometric
+};
+
+/// Edges of the steps: 0, 1.5 cells, then geometric.
+struct ShellGrid {
+    std::vector<double> edge;
+};
+ShellGrid make_shells(double step_px, double extent_px, int count);
+
+struct PiecewiseProfile {
+    Eigen::VectorXd value;  ///< R_d per shell
+    bool is_converged = true;
+};
+
+/// R = T v with v >= 0 and T summing from the outside in: non-negative and falling.
+PiecewiseProfile fit_piecewise_monotone(const DistanceHistogram& histogram,
+                                        const Eigen::VectorXd& exitance, int field,
+                                        const ProfileFitOptions& options);
+
+/// As published: QMR on the ridged normal equations, negative steps cut to 0.
+PiecewiseProfile fit_piecewise_qmr(const DistanceHistogram& histogram,
+                                   const Eigen::VectorXd& exitance, int field,
+                                   const ProfileFitOptions& options);
+
+/// Two exponentials that best explain the exitance: for every pair of lengths on a grid the
+/// amplitudes follow in closed form (variable projection); robust weights (Huber, 4 rounds).
+TwoExponentials fit_exponentials(const DistanceHistogram& histogram,
+                                 const Eigen::VectorXd& exitance, int field,
+                                 const ProfileFitOptions& options);
+
+/// Two exponentials through the steps, weighted with shell area (the published way).
+TwoExponentials fit_exponentials_to_shells(const ShellGrid& shells, const Eigen::VectorXd& value,
+                                           const ProfileFitOptions& options);
+
+/// Fits the brightest channel freely; the others are that profile with their own albedo and a
+/// width at most as large, ordered like the albedos: R_c(r) = rho_c R(r / s_c) / s_c^2.
+/// @param exitance one column per channel; field c of the histogram belongs to channel c
+RgbExponentials fit_ordered(const DistanceHistogram& histogram, const Eigen::MatrixXd& exitance,
+                            const ProfileFitOptions& options);
+
+}  // namespace vitrine
