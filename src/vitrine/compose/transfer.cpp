@@ -77,12 +77,15 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
         estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, analysis.lights.lights,
                         options.bssrdf, progress.part(0.6, 0.9));
 
+    lifted.brightness = limit_albedo(lifted.medium);
+
     TranslucentRenderOptions render_options;
     render_options.eta = options.bssrdf.eta;
     const TranslucentRelief renderer(analysis.relief, render_options);
     lifted.rendered = renderer.render(
         irradiance_from_lights(analysis.relief, analysis.lights.lights, options.bssrdf.eta),
         lifted.medium.profile());
+    for (Rgb& pixel : lifted.rendered) pixel *= static_cast<float>(lifted.brightness);
     lifted.self_psnr_db =
         encoded_psnr(lifted.rendered, shown, photo.mask, analysis.highlights.grown);
     Rgbd mean = Rgbd::Zero();

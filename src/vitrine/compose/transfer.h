@@ -61,7 +61,8 @@ struct PhotoAnalysis {
 struct LiftedMaterial {
     PhotoAnalysis analysis;
     MediumEstimate medium;
-    ImageRgb rendered;        ///< the material photo's object rendered with what was found
+    double brightness = 1;  ///< the light is this much stronger than assumed (limit_albedo)
+    ImageRgb rendered;      ///< the material photo's object rendered with what was found
     double self_psnr_db = 0;  ///< of that against the photo without highlights, encoded sRGB
     double flat_psnr_db = 0;  ///< of the best single colour, for comparison
 };

@@ -88,15 +88,17 @@ void judge(MediumEstimate& medium, int c, double longest_px, double mean_exitanc
         medium.warnings.push_back(fmt::format(
             "The material is textured ({} channel): its average is used.", kChannelNames[c]));
     }
-    if (channel.albedo > kDipoleMaxTotal) {
-        if (c == 0 || medium.channels[static_cast<std::size_t>(c - 1)].albedo <= kDipoleMaxTotal) {
-            medium.warnings.push_back(
-                "The material reflects more than a real one can: the material photo is exposed too "
-                "brightly, so no equivalent medium is given.");
+}
+
+void equivalent_media(MediumEstimate& medium) {
+    for (std::size_t c = 0; c < 3; ++c) {
+        const ChannelFit& channel = medium.channels[c];
+        medium.dipole[c].reset();
+        if (channel.albedo > 1e-4 && channel.albedo <= kDipoleMaxTotal &&
+            channel.mean_radius_px > 0) {
+            medium.dipole[c] = dipole_from_total_and_mean_radius(
+                channel.albedo, channel.mean_radius_px, medium.eta);
         }
-    } else if (channel.albedo > 1e-4 && channel.mean_radius_px > 0) {
-        medium.dipole[static_cast<std::size_t>(c)] =
-            dipole_from_total_and_mean_radius(channel.albedo, channel.mean_radius_px, medium.eta);
     }
 }
 
@@ -196,8 +198,29 @@ MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, co
             std::max(mean_exitance, 1e-9);
         judge(medium, c, fit_options.longest_px, mean_exitance / kPi);
     }
+    equivalent_media(medium);
     progress.update(1.0, "material: done");
     return medium;
+}
+
+double limit_albedo(MediumEstimate& medium) {
+    double largest = 0;
+    for (const ChannelFit& channel : medium.channels) largest = std::max(largest, channel.albedo);
+    if (largest <= kPlausibleAlbedo) return 1;
+    const double factor = kPlausibleAlbedo / largest;
+    for (std::size_t c = 0; c < 3; ++c) {
+        medium.fit[c].a *= factor;
+        medium.fit[c].c *= factor;
+        medium.channels[c].albedo *= factor;
+    }
+    for (Rgbd& rd : medium.piecewise.rd) rd *= factor;
+    if (largest > 1.5) {
+        medium.warnings.push_back(
+            "The material photo shows more light than the estimated lamps can explain; the "
+            "material's brightness was reduced to a plausible one.");
+    }
+    equivalent_media(medium);
+    return 1 / factor;
 }
 
 }  // namespace vitrine

@@ -72,4 +72,12 @@ MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, co
                                const ViewLights& lights, const BssrdfOptions& options = {},
                                const Progress& progress = {});
 
+/// Light and albedo share one unknown factor. Where the brightest channel would reflect more than
+/// kPlausibleAlbedo, all channels are scaled down to it (equivalent media follow).
+/// @returns the factor by which the light must then be stronger, >= 1
+double limit_albedo(MediumEstimate& medium);
+
+/// Marble, milk and wax reflect 0.75 to 0.9 in their brightest channel.
+constexpr double kPlausibleAlbedo = 0.8;
+
 }  // namespace vitrine

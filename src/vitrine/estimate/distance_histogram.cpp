@@ -6,6 +6,25 @@
 
 namespace vitrine {
 
+CappedKernel::CappedKernel(RadialKernel kernel, double rho)
+    : kernel_(std::move(kernel)), rho_(rho), value_(kernel_(rho)) {
+    const double h = 0.02 * rho;
+    const double slope = std::min(0.0, (std::log(std::max(kernel_(rho + h), 1e-300)) -
+                                        std::log(std::max(kernel_(rho - h), 1e-300))) /
+                                           (2 * h));
+    curvature_ = slope / (2 * rho);
+    // int 2 pi r (R - cap) dr with r = rho s^2, which tames steep kernels.
+    constexpr int kSteps = 200;
+    for (int i = 0; i < kSteps; ++i) {
+        const double s = (i + 0.5) / kSteps, r = rho * s * s;
+        near_share_ += 2 * kPi * r * (kernel_(r) - (*this)(r)) * 2 * rho * s / kSteps;
+    }
+}
+
+double CappedKernel::operator()(double r) const {
+    return r >= rho_ ? kernel_(r) : value_ * std::exp(curvature_ * (r * r - rho_ * rho_));
+}
+
 ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
                                      double rim_px, double min_cos, std::uint64_t seed) {
     const ImageF rim = distance_to(mask_not(relief.mask));
@@ -93,26 +112,11 @@ Eigen::MatrixXd DistanceHistogram::image_of_nodes(const Eigen::VectorXd& values)
 }
 
 Eigen::MatrixXd DistanceHistogram::image_of(const RadialKernel& kernel) const {
-    // The cap: Gaussian with the kernel's value and slope at rho (see render/translucent_relief).
-    const double rho = 1.5 * step_, h = 0.02 * rho;
-    const double value = kernel(rho);
-    const double slope = std::min(0.0, (std::log(std::max(kernel(rho + h), 1e-300)) -
-                                        std::log(std::max(kernel(rho - h), 1e-300))) /
-                                           (2 * h));
-    const auto cap = [&](double r) {
-        return value * std::exp(slope / (2 * rho) * (r * r - rho * rho));
-    };
+    const CappedKernel capped(kernel, 1.5 * step_);
     Eigen::VectorXd far(static_cast<Eigen::Index>(nodes_.size()));
     for (std::size_t k = 0; k < nodes_.size(); ++k)
-        far[static_cast<Eigen::Index>(k)] = nodes_[k] < rho ? cap(nodes_[k]) : kernel(nodes_[k]);
-    // Near share: int 2 pi r (R - cap) dr with r = rho s^2, which tames steep kernels.
-    double near_share = 0;
-    constexpr int kSteps = 200;
-    for (int i = 0; i < kSteps; ++i) {
-        const double s = (i + 0.5) / kSteps, r = rho * s * s;
-        near_share += 2 * kPi * r * (kernel(r) - cap(r)) * 2 * rho * s / kSteps;
-    }
-    return image_of_nodes(far) + near_share * local_;
+        far[static_cast<Eigen::Index>(k)] = capped(nodes_[k]);
+    return image_of_nodes(far) + capped.near_share() * local_;
 }
 
 }  // namespace vitrine

@@ -14,6 +14,22 @@ namespace vitrine {
 /// A kernel R(r) of one channel, per area.
 using RadialKernel = std::function<double(double r)>;
 
+/// A kernel that a lattice can hold: below `rho` a Gaussian cap with its value and slope there
+/// (as in render/translucent_relief), and the albedo that this leaves out.
+class CappedKernel {
+  public:
+    CappedKernel(RadialKernel kernel, double rho);
+    double operator()(double r) const;
+    double near_share() const { return near_share_; }
+
+  private:
+    RadialKernel kernel_;
+    double rho_;
+    double value_;
+    double curvature_;
+    double near_share_ = 0;
+};
+
 /// Points of a relief at which the picture is compared with the model.
 struct ReliefObservations {
     std::vector<Vec3f> position;

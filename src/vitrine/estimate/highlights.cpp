@@ -111,7 +111,9 @@ std::vector<std::vector<std::size_t>> pieces(const Mask& mask) {
 void grow(const std::vector<std::size_t>& blob, const ImageF& y, const Mask& mask,
           const Mask& other_cores, double inradius_px, Mask& grown) {
     const int width = y.width();
-    const int reach = std::max(3, static_cast<int>(0.25 * inradius_px));
+    const double blob_radius = std::sqrt(static_cast<double>(blob.size()) / kPi);
+    const int reach =
+        std::max(3, static_cast<int>(std::min(0.25 * inradius_px, 1.2 * blob_radius + 3)));
     int x0 = width, x1 = 0, y0 = y.height(), y1 = 0;
     for (const std::size_t i : blob) {
         const int px = static_cast<int>(i) % width, py = static_cast<int>(i) / width;
@@ -219,24 +221,32 @@ Highlights find_highlights(const ImageRgb& linear, const Mask& mask, double satu
     std::vector<double> values;
     for (std::size_t i = 0; i < mask.size(); ++i)
         if (mask[i] > 127) values.push_back(y[i]);
-    const double middle = median(std::move(values));
+    const double middle = median(values);
+    // Noses and brows stick out of their surroundings too; a lamp outshines the whole object.
+    const double bright = std::min(quantile(std::move(values), 0.9), 0.98 - 0.5 * options.top_hat);
 
     result.core = Mask(width, height);
     for (std::size_t i = 0; i < mask.size(); ++i) {
         if (mask[i] <= 127) continue;
         const bool in_histogram = y[i] > threshold && excess[i] > 0.3 * options.top_hat;
-        if (in_histogram || (excess[i] > options.top_hat && y[i] > middle)) result.core[i] = 255;
+        if (in_histogram || (excess[i] > options.top_hat && y[i] > std::max(middle, bright)))
+            result.core[i] = 255;
     }
     result.core = dilate(erode(result.core, 1), 1);
     const ImageF rim = distance_to(mask_not(mask));
     std::vector<std::vector<std::size_t>> kept;
     for (std::vector<std::size_t>& blob : pieces(result.core)) {
         std::vector<double> rims;
-        for (const std::size_t i : blob) rims.push_back(rim[i]);
+        float peak = 0;
+        for (const std::size_t i : blob) {
+            rims.push_back(rim[i]);
+            peak = std::max(peak, y[i]);
+        }
         const auto size = static_cast<double>(blob.size());
         // Slivers along the contour are mixed pixels; specks are noise; vast areas are shading.
         const bool is_highlight = median(rims) > std::max(1.5, 0.02 * radius) &&
-                                  size <= 0.05 * inside && size >= 0.0001 * inside;
+                                  size <= 0.05 * inside && size >= 0.0001 * inside &&
+                                  peak > bright + 0.5 * options.top_hat;
         if (is_highlight) kept.push_back(std::move(blob));
     }
     result.core = Mask(width, height);

@@ -6,6 +6,7 @@
 #include "image/colour.h"
 #include "image/filter.h"
 #include "math/nnls.h"
+#include "math/statistics.h"
 
 #include <numeric>
 
@@ -17,17 +18,15 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 /// The picture as the fit sees it: luminance over what leaves the surface, mean 1.
-VectorXd observed_exitance(const ImageRgb& diffuse, const Relief& relief,
-                           const ReliefObservations& observations, double eta) {
-    ImageRgb inside = diffuse;
-    const ImageF y = gaussian_blur(luminance_image(inside), 1.0);
+VectorXd observed_exitance(const ImageRgb& diffuse, const ReliefObservations& observations,
+                           double eta) {
+    const ImageF y = gaussian_blur(luminance_image(diffuse), 1.0);
     VectorXd result(static_cast<Index>(observations.pixel.size()));
     for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
         const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
         result[static_cast<Index>(p)] =
             y[observations.pixel[p]] / fresnel_transmittance(cosine, eta);
     }
-    (void)relief;
     return result / std::max(result.mean(), 1e-12);
 }
 
@@ -89,6 +88,44 @@ Fit fit_intensities(const MatrixXd& image, const VectorXd& y, const VectorXd& we
 
 struct KernelChoice {
     double g1 = 1, g2 = 1, mix = 1;
+};
+
+/// Huber's weights: creases, ears and other shape errors must not steer the lights.
+VectorXd robust_weights(const MatrixXd& image, const VectorXd& intensity, const VectorXd& y,
+                        const VectorXd& weight) {
+    const VectorXd residual = weight.cwiseProduct(image * intensity - y);
+    const double bend =
+        1.5 * std::max(1e-6, robust_sd(std::vector<double>(residual.data(),
+                                                           residual.data() + residual.size())));
+    VectorXd result = weight;
+    for (Index i = 0; i < residual.size(); ++i)
+        if (std::abs(residual[i]) > bend) result[i] *= std::sqrt(bend / std::abs(residual[i]));
+    return result;
+}
+
+/// The image operator of one kernel, for lights that move: exitance = near * local + far * source.
+class KernelImage {
+  public:
+    KernelImage(const ReliefObservations& observations, const ReliefSamples& samples,
+                const RadialKernel& kernel)
+        : far_(static_cast<Index>(observations.position.size()),
+               static_cast<Index>(samples.position.size())) {
+        const CappedKernel capped(kernel, 1.5 * samples.step_px);
+        near_ = capped.near_share();
+        parallel_for(observations.position.size(), 8, [&](std::size_t p) {
+            for (std::size_t i = 0; i < samples.position.size(); ++i) {
+                far_(static_cast<Index>(p), static_cast<Index>(i)) = static_cast<float>(
+                    capped((samples.position[i] - observations.position[p]).norm()));
+            }
+        });
+    }
+    MatrixXd operator()(const Fields& fields) const {
+        return (far_ * fields.source).cast<double>() + near_ * fields.local.cast<double>();
+    }
+
+  private:
+    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> far_;
+    double near_ = 0;
 };
 
 RadialKernel exponential(double g) {
@@ -194,7 +231,7 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         result.reason = "too little of the object is free of highlights and rim";
         return result;
     }
-    const VectorXd y = observed_exitance(diffuse, relief, observations, options.eta);
+    const VectorXd y = observed_exitance(diffuse, observations, options.eta);
     const VectorXd weight = y.cwiseMax(0.2).cwiseInverse();
     const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
 
@@ -239,7 +276,10 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     };
     std::vector<Fit> fits(choices.size());
     parallel_for(choices.size(), 1, [&](std::size_t k) {
-        fits[k] = fit_intensities(mixed(choices[k]), y, weight, price);
+        const MatrixXd image = mixed(choices[k]);
+        fits[k] = fit_intensities(image, y, weight, price);
+        const VectorXd robust = robust_weights(image, fits[k].intensity, y, weight);
+        fits[k] = fit_intensities(image, y, robust, price);
     });
     std::size_t best = 0;
     for (std::size_t k = 1; k < fits.size(); ++k)
@@ -253,21 +293,52 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
                                         options.merge_deg, options.max_lights);
 
-    // Intensities again, for the few that are left.
+    // Directions move freely now, intensities follow: pattern search on the sphere.
     std::vector<Vec3> few;
     for (const ViewLight& light : result.lights.lights) few.push_back(light.direction);
-    VectorXd few_price(static_cast<Index>(few.size()) + 1);
-    for (std::size_t l = 0; l < few.size(); ++l) {
-        few_price[static_cast<Index>(l)] =
-            options.direction_penalty * (1 + 3 * std::max(0.0, -few[l].z())) * 0.3;
+    const KernelImage image_of(observations, samples, [&](double r) {
+        return choice.mix * exponential(w1)(r) + (1 - choice.mix) * exponential(w2)(r);
+    });
+    const auto solve = [&](const std::vector<Vec3>& trial, const VectorXd& weights) {
+        VectorXd few_price(static_cast<Index>(trial.size()) + 1);
+        for (std::size_t l = 0; l < trial.size(); ++l) {
+            few_price[static_cast<Index>(l)] =
+                0.3 * options.direction_penalty * (1 + 3 * std::max(0.0, -trial[l].z()));
+        }
+        few_price[static_cast<Index>(trial.size())] = price[count];
+        const MatrixXd image =
+            image_of(light_fields(relief, samples, observations, trial, options));
+        return fit_intensities(image, y, weights, few_price);
+    };
+    VectorXd few_weight = weight;
+    {
+        const MatrixXd image = image_of(light_fields(relief, samples, observations, few, options));
+        few_weight = robust_weights(image, solve(few, weight).intensity, y, weight);
     }
-    few_price[static_cast<Index>(few.size())] = price[count];
-    const Fields few_fields = light_fields(relief, samples, observations, few, options);
-    const DistanceHistogram few_histogram(observations, samples, few_fields.source,
-                                          few_fields.local);
-    const MatrixXd few_image = choice.mix * few_histogram.image_of(exponential(w1)) +
-                               (1 - choice.mix) * few_histogram.image_of(exponential(w2));
-    const Fit final_fit = fit_intensities(few_image, y, weight, few_price);
+    Fit final_fit = solve(few, few_weight);
+    for (double step = radians(options.polish_deg); step > radians(0.6); step *= 0.5) {
+        for (bool has_moved = true; has_moved;) {
+            has_moved = false;
+            for (std::size_t l = 0; l < few.size(); ++l) {
+                const Vec3 side = few[l].unitOrthogonal(), up = few[l].cross(side);
+                for (int k = 0; k < 6; ++k) {
+                    const double turn = k * kPi / 3;
+                    std::vector<Vec3> trial = few;
+                    trial[l] = std::cos(step) * few[l] +
+                               std::sin(step) * (std::cos(turn) * side + std::sin(turn) * up);
+                    const Fit fit = solve(trial, few_weight);
+                    if (fit.residual < final_fit.residual * (1 - 1e-4)) {
+                        final_fit = fit;
+                        few = trial;
+                        has_moved = true;
+                        break;
+                    }
+                }
+            }
+        }
+        progress.update(0.9, "lights: directions");
+    }
+    const MatrixXd few_image = image_of(light_fields(relief, samples, observations, few, options));
     std::vector<ViewLight> kept;
     for (std::size_t l = 0; l < few.size(); ++l) {
         const double value = final_fit.intensity[static_cast<Index>(l)];

@@ -24,6 +24,7 @@ struct TranslucencyLightOptions {
     double highlight_discount = 0.3;  ///< factor on the price of directions seen as highlights
     double merge_deg = 40.0;          ///< lights closer than this become one
     int max_lights = 3;
+    double polish_deg = 8.0;  ///< first step of the search for better directions; 0: none
     bool use_shadows = true;  ///< the object's own cast shadows
     std::uint64_t seed = 1;   ///< of the choice of pixels
 };
