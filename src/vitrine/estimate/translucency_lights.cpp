@@ -299,46 +299,56 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     const KernelImage image_of(observations, samples, [&](double r) {
         return choice.mix * exponential(w1)(r) + (1 - choice.mix) * exponential(w2)(r);
     });
-    const auto solve = [&](const std::vector<Vec3>& trial, const VectorXd& weights) {
+    const MatrixXd ambient_column =
+        image_of(light_fields(relief, samples, observations, {}, options));
+    const auto column_of = [&](const Vec3& direction) -> VectorXd {
+        return image_of(light_fields(relief, samples, observations, {direction}, options)).col(0);
+    };
+    const auto solve = [&](const MatrixXd& columns, const std::vector<Vec3>& trial,
+                           const VectorXd& weights) {
         VectorXd few_price(static_cast<Index>(trial.size()) + 1);
         for (std::size_t l = 0; l < trial.size(); ++l) {
             few_price[static_cast<Index>(l)] =
                 0.3 * options.direction_penalty * (1 + 3 * std::max(0.0, -trial[l].z()));
         }
         few_price[static_cast<Index>(trial.size())] = price[count];
-        const MatrixXd image =
-            image_of(light_fields(relief, samples, observations, trial, options));
-        return fit_intensities(image, y, weights, few_price);
+        return fit_intensities(columns, y, weights, few_price);
     };
-    VectorXd few_weight = weight;
-    {
-        const MatrixXd image = image_of(light_fields(relief, samples, observations, few, options));
-        few_weight = robust_weights(image, solve(few, weight).intensity, y, weight);
-    }
-    Fit final_fit = solve(few, few_weight);
-    for (double step = radians(options.polish_deg); step > radians(0.6); step *= 0.5) {
-        for (bool has_moved = true; has_moved;) {
-            has_moved = false;
+    MatrixXd few_image(y.size(), static_cast<Index>(few.size()) + 1);
+    for (std::size_t l = 0; l < few.size(); ++l)
+        few_image.col(static_cast<Index>(l)) = column_of(few[l]);
+    few_image.col(static_cast<Index>(few.size())) = ambient_column.col(0);
+    const VectorXd few_weight =
+        robust_weights(few_image, solve(few_image, few, weight).intensity, y, weight);
+    Fit final_fit = solve(few_image, few, few_weight);
+    const auto try_move = [&](std::size_t l, const Vec3& direction) {
+        std::vector<Vec3> trial = few;
+        trial[l] = direction;
+        MatrixXd image = few_image;
+        image.col(static_cast<Index>(l)) = column_of(direction);
+        const Fit fit = solve(image, trial, few_weight);
+        if (fit.residual >= final_fit.residual * (1 - 1e-3)) return false;
+        final_fit = fit;
+        few = trial;
+        few_image = image;
+        return true;
+    };
+    for (double step = radians(options.polish_deg); step > radians(1.0); step *= 0.5) {
+        for (int round = 0; round < 4; ++round) {
+            bool has_moved = false;
             for (std::size_t l = 0; l < few.size(); ++l) {
                 const Vec3 side = few[l].unitOrthogonal(), up = few[l].cross(side);
                 for (int k = 0; k < 6; ++k) {
                     const double turn = k * kPi / 3;
-                    std::vector<Vec3> trial = few;
-                    trial[l] = std::cos(step) * few[l] +
-                               std::sin(step) * (std::cos(turn) * side + std::sin(turn) * up);
-                    const Fit fit = solve(trial, few_weight);
-                    if (fit.residual < final_fit.residual * (1 - 1e-4)) {
-                        final_fit = fit;
-                        few = trial;
-                        has_moved = true;
-                        break;
-                    }
+                    has_moved |= try_move(
+                        l, std::cos(step) * few[l] +
+                               std::sin(step) * (std::cos(turn) * side + std::sin(turn) * up));
                 }
             }
+            if (!has_moved) break;
         }
         progress.update(0.9, "lights: directions");
     }
-    const MatrixXd few_image = image_of(light_fields(relief, samples, observations, few, options));
     std::vector<ViewLight> kept;
     for (std::size_t l = 0; l < few.size(); ++l) {
         const double value = final_fit.intensity[static_cast<Index>(l)];
