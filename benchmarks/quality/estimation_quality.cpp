@@ -1,8 +1,13 @@
-// Errors of the estimators against known truth: vitrine_estimation_quality CAPTURE...
-// Uses the true meshes in place of a reconstruction: what is left is the estimators' own error.
+// Errors of the estimators against known truth:
+//   vitrine_estimation_quality [--scan CACHE] [--pictures DIR] [--verbose] CAPTURE...
+// Without --scan the true meshes take the place of a reconstruction: what is left is the
+// estimators' own error.
 #include "base/log.h"
 #include "base/timer.h"
-#include "estimate/materials.h"
+#include "estimate/scene_estimate.h"
+#include "image/colour.h"
+#include "image/image_io.h"
+#include "reconstruct/labelled_scene.h"
 #include "truth_scene.h"
 
 #include <cstdio>
@@ -11,11 +16,11 @@ using namespace vitrine;
 
 namespace {
 
-void print_lights(const TrueScene& truth, const LightEstimate& estimate, double seconds) {
+void print_lights(const TrueScene& truth, const LightEstimate& estimate) {
     std::printf(
-        "lights %.1f s  cost %.4f -> %.4f  rms %.3f  ambient %.4f (true %.4f)  ref %.3f %.3f "
+        "lights: cost %.4f -> %.4f  rms %.3f  ambient %.4f (true %.4f)  ref %.3f %.3f "
         "%.3f\n",
-        seconds, estimate.error_initial, estimate.error_refined, estimate.residual_rms,
+        estimate.error_initial, estimate.error_refined, estimate.residual_rms,
         estimate.ambient_radiance[1], truth.ambient_radiance[1], estimate.reference_point_m.x(),
         estimate.reference_point_m.y(), estimate.reference_point_m.z());
     for (const FittedLight& fitted : estimate.lights) {
@@ -71,28 +76,91 @@ void print_object(const TrueObject& truth, const ObjectEstimate& object) {
         }
 }
 
+/// Reconstructed geometry, kept under `cache` for the next run.
+Scene reconstructed(const Capture& capture, const std::filesystem::path& cache) {
+    const std::filesystem::path file = cache / capture.name / "scene.json";
+    if (std::filesystem::exists(file)) return read_scene(file);
+    const Scan scan = make_scan(capture);
+    const Scene scene = build_scene(scan, find_candidates(capture, scan));
+    std::filesystem::create_directories(file.parent_path());
+    write_scene(file, scene);
+    return scene;
+}
+
+const TrueObject* nearest_object(const TrueScene& truth, const Mesh& hull) {
+    const Vec3 centre = bounds(hull).centre();
+    const TrueObject* nearest = nullptr;
+    for (const TrueObject& object : truth.objects)
+        if ((object.centroid - centre).norm() < 0.06) nearest = &object;
+    return nearest;
+}
+
+/// What the cameras would see of the applied scene's albedo: shadows left in it show here.
+void write_albedo_picture(const Scene& applied, std::size_t frame, const std::string& path) {
+    const EstimationScene world(applied);
+    const Camera& camera = applied.cameras[frame];
+    const Vec3f eye = camera.centre_in_world().cast<float>();
+    ImageRgb picture(camera.width, camera.height);
+    for (int v = 0; v < camera.height; ++v)
+        for (int u = 0; u < camera.width; ++u) {
+            const Vec3f direction = camera.ray_in_world(u, v).cast<float>();
+            const Hit hit = world.accel().closest({eye, direction, 0.0f, 1e30f, kScanMask});
+            if (const auto colour = world.scan_radiance(hit, direction)) picture(u, v) = *colour;
+        }
+    write_png(path, linear_to_srgb8(picture));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-    set_log_level(LogLevel::Debug);
+    std::filesystem::path cache, pictures;
     for (int i = 1; i < argc; ++i) {
-        const std::filesystem::path folder = argv[i];
-        std::printf("== %s\n", folder.filename().c_str());
+        const std::string argument = argv[i];
+        if (argument == "--scan" && i + 1 < argc) {
+            cache = argv[++i];
+            continue;
+        }
+        if (argument == "--pictures" && i + 1 < argc) {
+            pictures = argv[++i];
+            continue;
+        }
+        if (argument == "--verbose") {
+            set_log_level(LogLevel::Debug);
+            continue;
+        }
+        const std::filesystem::path folder = argument;
+        std::printf("== %s, %s geometry\n", folder.filename().c_str(),
+                    cache.empty() ? "true" : "reconstructed");
         const Capture capture = read_capture(folder);
         const TrueScene truth = read_truth(folder);
+        const Scene scene =
+            cache.empty() ? make_true_geometry(folder, capture) : reconstructed(capture, cache);
         Timer timer;
-        const Scene scene = make_true_geometry(folder, capture);
-        std::printf("geometry %.1f s\n", timer.seconds());
-        LightOptions options;
-        options.reference_albedo = capture.reference_albedo;
+        const SceneEstimate estimate = estimate_scene(scene, capture);
+        std::printf("estimation %.1f s:", timer.seconds());
+        for (const auto& [part, seconds] : estimate.seconds)
+            std::printf(" %s %.1f", part.c_str(), seconds);
+        std::printf(", error %.4f -> %.4f, complete: %s\n", estimate.error_initial,
+                    estimate.error_joint, estimate.is_complete() ? "yes" : "no");
+        print_lights(truth, estimate.light);
+        const EstimationScene world(scene);
+        for (int k = 0; k < world.object_count(); ++k) {
+            const ObjectEstimate& object = estimate.objects[static_cast<std::size_t>(k)];
+            const TrueObject* match = nearest_object(truth, world.mesh(world.part_of_object(k)));
+            TrueObject nothing;
+            nothing.name = "nothing there";
+            nothing.object_class = "diffuse";
+            print_object(match ? *match : nothing, object);
+        }
+        if (pictures.empty()) continue;
         timer = Timer();
-        const LightEstimate lights =
-            estimate_lights(scene, capture.frames, capture.saturation_level, options);
-        print_lights(truth, lights, timer.seconds());
-        timer = Timer();
-        const std::vector<ObjectEstimate> objects =
-            estimate_materials(scene, capture.frames, capture.saturation_level, lights);
-        std::printf("materials %.1f s\n", timer.seconds());
-        for (std::size_t k = 0; k < objects.size(); ++k) print_object(truth.objects[k], objects[k]);
+        const Scene applied = apply(scene, estimate);
+        std::printf("apply %.1f s\n", timer.seconds());
+        std::filesystem::create_directories(pictures);
+        for (const std::size_t frame : {0, 3})
+            write_albedo_picture(
+                applied, frame,
+                (pictures / (capture.name + "_albedo_" + capture.frames[frame].id + ".png"))
+                    .string());
     }
 }
