@@ -13,15 +13,19 @@ constexpr int kGatherRays = 24;  // noisy one by one; neighbours share after smo
 constexpr int kSmoothRounds = 3;
 constexpr int kDiscSamples = 24;
 constexpr int kPhotons = 400'000;
-constexpr int kDiffusionRounds = 120;
+constexpr int kRelaxationRounds = 250;
+constexpr float kOverRelaxation = 1.85f;
+constexpr float kCertainWeight = 100.0f;  // doubt below about 10 %
 constexpr float kMaxAlbedo = 0.97f, kMinAlbedo = 0.005f;
 
 // Relative doubt of each part of the irradiance, by comparison with made scenes.
 constexpr float kDirectDoubt = 0.03f;
 constexpr float kPenumbraDoubt = 0.35f;  // of the unshadowed direct light, at half shadow
 constexpr float kCausticDoubt = 0.5f;    // caustics are sharper than a hull can tell
+constexpr float kThroughDoubt = 0.3f;    // of the light that a clear object redirects
 constexpr float kBouncedDoubt = 0.25f;
-constexpr float kSmoothness = 25.0f;  // pull of neighbours, in units of 1 / doubt^2
+constexpr float kWildDoubt = 0.15f;
+constexpr float kSmoothness = 10.0f;  // pull of neighbours, in units of 1 / doubt^2
 
 std::size_t at(int i) { return static_cast<std::size_t>(i); }
 
@@ -84,7 +88,15 @@ Irradiance irradiance_of(const EstimationScene& world, const Mesh& mesh, const R
                               estimate.objects[at(k)].object_class == ObjectClass::Transparent;
         (is_clear ? clear : opaque) |= object_mask(k);
     }
+    // Metal sends on what it gets: about its albedo times what the scan around it shows.
+    Rgb mean_radiance = Rgb::Zero();
+    for (const Rgb& c : mesh.colours) mean_radiance += c / static_cast<float>(mesh.colours.size());
     std::vector<Rgb> object_radiance(at(world.object_count()), Rgb::Zero());
+    for (std::size_t k = 0; k < std::min(object_radiance.size(), estimate.objects.size()); ++k)
+        if (!estimate.objects[k].clusters.empty()) {
+            const Ward& ward = estimate.objects[k].clusters.front().fit.ward;
+            object_radiance[k] = (ward.rho_d + ward.rho_s).min(1.0f) * mean_radiance;
+        }
     GatheredLight gathered = gather_light(world, points, kGatherRays, clear, object_radiance, 11);
     smooth(mesh, rings, gathered.bounced, kSmoothRounds);
     smooth(mesh, rings, gathered.openness, kSmoothRounds);
@@ -130,7 +142,7 @@ Irradiance irradiance_of(const EstimationScene& world, const Mesh& mesh, const R
                 result.value[i] += e;
                 // In the object's shadow what arrives is the caustic, and its model's doubt.
                 variance[i] += std::pow(kCausticDoubt * luminance(e), 2.0f) +
-                               std::pow(0.15f * strength * lit.through[i], 2.0f);
+                               std::pow(kThroughDoubt * strength * lit.through[i], 2.0f);
             }
         }
     }
@@ -160,22 +172,24 @@ std::vector<char> seen_by_cameras(const EstimationScene& world, const std::vecto
     return seen;
 }
 
-/// Minimises sum w (log a - log a0)^2 + sum_edges (log a_i - log a_j)^2 by Jacobi sweeps.
+/// Minimises sum w (log a - log a0)^2 + sum_edges (log a_i - log a_j)^2 over the vertices that are
+/// not certain, by successive over-relaxation: certain ones keep what was observed.
 void diffuse_albedo(const Rings& rings, const std::vector<float>& weight,
                     std::vector<Rgb>& log_albedo) {
     const std::vector<Rgb> observed = log_albedo;
-    std::vector<Rgb> next(log_albedo.size());
-    for (int round = 0; round < kDiffusionRounds; ++round) {
-        parallel_for(log_albedo.size(), 2048, [&](std::size_t i) {
+    std::vector<std::size_t> active;
+    for (std::size_t i = 0; i < weight.size(); ++i)
+        if (weight[i] < kCertainWeight) active.push_back(i);
+    for (int round = 0; round < kRelaxationRounds; ++round) {
+        for (const std::size_t i : active) {
             Rgb sum = weight[i] * observed[i];
             float total = weight[i];
             for (int k = rings.start[i]; k < rings.start[i + 1]; ++k) {
                 sum += kSmoothness * log_albedo[at(rings.neighbour[at(k)])];
                 total += kSmoothness;
             }
-            next[i] = total > 0.0f ? Rgb(sum / total) : observed[i];
-        });
-        log_albedo.swap(next);
+            if (total > 0.0f) log_albedo[i] += kOverRelaxation * (sum / total - log_albedo[i]);
+        }
     }
 }
 
@@ -197,8 +211,7 @@ Mesh with_albedo(const EstimationScene& world, const Scene& scene, const Mesh& r
         log_albedo[i] = albedo.log();
         const float doubt = irradiance.doubt[i];
         weight[i] = seen[i] ? 1.0f / (0.0009f + doubt * doubt) : 0.0f;
-        // The most certain points keep their texture: neighbours pull 1 % of their weight.
-        weight[i] *= doubt < 0.08f ? 4.0f : doubt < 0.2f ? 1.0f : 0.05f;
+        if (doubt > kWildDoubt) weight[i] *= 0.02f;  // a wrong model, not noise: leave it to others
     }
     diffuse_albedo(rings, weight, log_albedo);
     for (std::size_t i = 0; i < points.size(); ++i)

@@ -21,7 +21,7 @@ constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are 
 constexpr double kMinSeparationRad = 0.436;
 // Block sums see noise and texture, not the model's own error (bounced light of 96 rays, disc of
 // uniform emission, a mesh 1 mm off): the share found by comparing with known lights.
-constexpr double kModelDeviationRad = 0.006;
+constexpr double kModelDeviationRad = 0.009;
 constexpr double kModelLogDistance = 0.02;
 
 struct Masks {
@@ -242,7 +242,7 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
         fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
         const LightDeviation deviation = light_deviation(fit, set, k);
         fitted.stddev_direction_deg =
-            degrees(std::hypot(deviation.direction_rad, kModelDeviationRad));
+            degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, kModelDeviationRad));
         fitted.stddev_distance_m =
             polar.distance_m * std::hypot(deviation.log_distance, kModelLogDistance);
         fitted.outcome = Outcome::Converged;

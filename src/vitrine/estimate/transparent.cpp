@@ -18,6 +18,9 @@ constexpr double kCap = 0.25;  // of the bright level: beyond, a pixel is simply
 constexpr int kIorGrid = 21;   // step 0.04: no basin of the objective is narrower
 constexpr int kBootstrapRounds = 40;
 constexpr float kMinLength = 0.005f;  // metres: shorter ways tell nothing of absorption
+// Resampled views share the hull's errors; the residual they leave tells how large those are.
+constexpr double kIorDoubtPerCost = 0.35;
+constexpr double kAbsorptionDoubt = 0.15;  // per metre: gain errors of 1 % over 7 cm
 constexpr double kMinExplained = 0.15;
 constexpr double kDefaultWall = 0.0025;
 
@@ -28,10 +31,10 @@ Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& 
     return seen ? *seen : ambient;
 }
 
-template <typename Trace>
+template <typename Trace, typename TraceInner>
 std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLookup& lookup,
                                   const std::vector<ObjectPixel>& pixels, const Rgb& ambient,
-                                  const Trace& trace) {
+                                  const Trace& trace, const TraceInner& trace_inner) {
     std::vector<ThroughPixel> result(pixels.size());
     parallel_for(pixels.size(), 16, [&](std::size_t i) {
         const ObjectPixel& pixel = pixels[i];
@@ -48,6 +51,12 @@ std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLooku
             background = *seen;
         }
         const Vec3f mirrored = reflect(-pixel.direction, path.entry_normal);
+        const RefractedPath inner = trace_inner(pixel);
+        if (inner.is_valid) {
+            result[i].inner =
+                inner.transmittance * environment(scene, inner.exit, inner.exit_direction, ambient);
+            result[i].inner_length_m = inner.length_m;
+        }
         result[i].transmitted = path.transmittance * background;
         result[i].reflected =
             path.entry_reflectance * environment(scene, path.entry, mirrored, ambient);
@@ -58,7 +67,7 @@ std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLooku
 }
 
 double pixel_cost(const ThroughPixel& t, const ObjectPixel& p, const Rgb& sigma_a, double bright) {
-    const Rgb model = t.transmitted * (-sigma_a * t.length_m).exp() + t.reflected;
+    const Rgb model = t.transmitted * (-sigma_a * t.length_m).exp() + t.side_light(sigma_a);
     return std::min(static_cast<double>((model - p.radiance).abs().mean()) / bright, kCap);
 }
 
@@ -68,26 +77,33 @@ struct Profile {
     double cost = 1.0;
 };
 
+/// Weighted median per channel; light from inside depends on the answer, so three rounds.
 Rgb absorption_of(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
                   double bright, const std::vector<int>& count) {
+    constexpr int kRounds = 3;
     Rgb sigma_a = Rgb::Zero();
     std::vector<double> value, weight;
-    for (int c = 0; c < 3; ++c) {
-        value.clear();
-        weight.clear();
-        for (std::size_t i = 0; i < pixels.size(); ++i) {
-            const ThroughPixel& t = through[i];
-            if (!t.is_valid || pixels[i].is_clipped || t.length_m < kMinLength) continue;
-            const double r0 = t.transmitted[c], r = pixels[i].radiance[c] - t.reflected[c];
-            if (r0 < 0.02 * bright) continue;
-            // A pixel darker than its reflection only says "much": keep it, at a large value.
-            value.push_back(std::log(r0 / std::max(r, 0.002 * bright)) / t.length_m);
-            weight.push_back(t.length_m * (count.empty() ? 1 : count[i]));
+    for (int round = 0; round < kRounds; ++round) {
+        const Rgb last = sigma_a;
+        for (int c = 0; c < 3; ++c) {
+            value.clear();
+            weight.clear();
+            double total = 0.0;
+            for (std::size_t i = 0; i < pixels.size(); ++i) {
+                const ThroughPixel& t = through[i];
+                if (!t.is_valid || pixels[i].is_clipped || t.length_m < kMinLength) continue;
+                if (!count.empty() && count[i] == 0) continue;
+                const double r0 = t.transmitted[c];
+                if (r0 < 0.02 * bright) continue;
+                const double r = pixels[i].radiance[c] - t.side_light(last)[c];
+                // Darker than its reflections only says "much": keep it, at a large value.
+                value.push_back(std::log(r0 / std::max(r, 0.002 * bright)) / t.length_m);
+                weight.push_back(t.length_m * (count.empty() ? 1 : count[i]));
+                total += weight.back();
+            }
+            if (total > 0.0)
+                sigma_a[c] = static_cast<float>(std::max(0.0, weighted_median(value, weight)));
         }
-        double total = 0.0;
-        for (const double w : weight) total += w;
-        if (total > 0.0)
-            sigma_a[c] = static_cast<float>(std::max(0.0, weighted_median(value, weight)));
     }
     return sigma_a;
 }
@@ -128,18 +144,27 @@ std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view
 std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
                                        int object, const std::vector<ObjectPixel>& pixels,
                                        double ior, const Rgb& ambient) {
-    return predict(scene, lookup, pixels, ambient, [&](const ObjectPixel& p) {
-        return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior));
-    });
+    return predict(
+        scene, lookup, pixels, ambient,
+        [&](const ObjectPixel& p) {
+            return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior));
+        },
+        [&](const ObjectPixel& p) {
+            return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior), 1);
+        });
 }
 
 std::vector<ThroughPixel> look_through_shell(const EstimationScene& scene,
                                              const FrameLookup& lookup, int object,
                                              const std::vector<ObjectPixel>& pixels, double ior,
                                              const Rgb& ambient) {
-    return predict(scene, lookup, pixels, ambient, [&](const ObjectPixel& p) {
-        return pass_through_shell(scene, object, p.eye, p.direction, static_cast<float>(ior), 1.0f);
-    });
+    return predict(
+        scene, lookup, pixels, ambient,
+        [&](const ObjectPixel& p) {
+            return pass_through_shell(scene, object, p.eye, p.direction, static_cast<float>(ior),
+                                      1.0f);
+        },
+        [](const ObjectPixel&) { return RefractedPath{}; });
 }
 
 Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
@@ -216,10 +241,12 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         const Rgb sigma = sigma_for(predicted[at], count);
         for (int c = 0; c < 3; ++c) sigmas[static_cast<std::size_t>(c)].push_back(sigma[c]);
     }
-    fit.ior.stddev = options.known_ior ? 0.0 : std::max(0.003, standard_deviation(iors));
+    fit.ior.stddev =
+        options.known_ior ? 0.0 : std::hypot(standard_deviation(iors), kIorDoubtPerCost * fit.cost);
     for (int c = 0; c < 3; ++c)
-        fit.sigma_a_per_m.stddev[c] = static_cast<float>(
-            std::max(0.1, standard_deviation(sigmas[static_cast<std::size_t>(c)])));
+        fit.sigma_a_per_m.stddev[c] =
+            static_cast<float>(std::hypot(standard_deviation(sigmas[static_cast<std::size_t>(c)]),
+                                          kAbsorptionDoubt + 0.03 * fit.sigma_a_per_m.value[c]));
     fit.sigma_a_per_m.outcome = Outcome::Converged;
     if (options.known_ior) fit.ior.outcome = Outcome::Converged;
     if (fit.explained < kMinExplained) {

@@ -22,12 +22,19 @@ struct TransparentOptions {
     std::optional<Rgb> known_sigma_a;
 };
 
-/// What one trial predicts in one pixel: transmitted * exp(-sigma_a length) + reflected.
+/// What one trial predicts in one pixel: transmitted * exp(-sigma_a length) + reflected, and the
+/// light that was reflected inside once: left out, it is read as a clearer glass (0.5 per metre).
 struct ThroughPixel {
     bool is_valid = false;
     Rgb transmitted = Rgb::Zero();
     Rgb reflected = Rgb::Zero();
     float length_m = 0.0f;
+    Rgb inner = Rgb::Zero();
+    float inner_length_m = 0.0f;
+    /// All but the main way.
+    Rgb side_light(const Rgb& sigma_a) const {
+        return reflected + inner * (-sigma_a * inner_length_m).exp();
+    }
 };
 
 struct TransparentFit {

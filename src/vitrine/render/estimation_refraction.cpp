@@ -12,7 +12,7 @@ constexpr float kLeave = 2e-5f;  // metres off a smooth hull: well above float n
 }
 
 RefractedPath refract_through(const EstimationScene& scene, int object, const Vec3f& origin,
-                              const Vec3f& direction, float ior) {
+                              const Vec3f& direction, float ior, int skipped_exits) {
     RefractedPath path;
     const Mesh& mesh = scene.mesh(scene.part_of_object(object));
     const std::uint32_t mask = object_mask(object);
@@ -37,7 +37,10 @@ RefractedPath refract_through(const EstimationScene& scene, int object, const Ve
         at = hit_point(mesh, hit);
         path.length_m += hit.distance;
         const float reflectance = fresnel_dielectric(std::min(cos_i, 1.0f), 1.0f / ior, cos_t);
-        if (cos_t > 0.0f) {
+        if (cos_t > 0.0f && skipped_exits > 0) {
+            --skipped_exits;
+            path.transmittance *= reflectance;
+        } else if (cos_t > 0.0f) {
             path.transmittance *= 1.0f - reflectance;
             path.exit = at;
             path.exit_direction = refract(-inside, Vec3f(-normal), 1.0f / ior, cos_t).normalized();
