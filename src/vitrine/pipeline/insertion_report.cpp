@@ -124,6 +124,10 @@ std::string light_overlay(const fs::path& plate, const JsonObject& camera,
         width, height, width, png_data_url(plate), width, height, arrows);
 }
 
+fs::path plate_path(const fs::path& workspace, const std::string& frame) {
+    return workspace / "60_composite" / (frame + "_plate.png");
+}
+
 }  // namespace
 
 void write_insertion_report(const fs::path& workspace, const std::string& capture_name,
@@ -137,18 +141,15 @@ void write_insertion_report(const fs::path& workspace, const std::string& captur
     if (fs::exists(list)) {
         const JsonObject frames = read_json_file(list);
         body += "<h2>Pictures: as captured, and with the virtual object</h2>\n";
-        bool is_first = true;
-        for (const JsonObject& frame : frames.objects("frames")) {
+        const std::vector<JsonObject> list_of_frames = frames.objects("frames");
+        for (const JsonObject& frame : list_of_frames) {
             const std::string id = frame.text("id");
-            const fs::path plate = workspace / "60_composite" / (id + "_plate.png");
-            body += comparison_html(
-                "frame-" + id, {"frame " + id, plate, workspace / "60_composite" / (id + ".png")});
-            if (is_first) {
-                body +=
-                    "<h2>The light</h2>\n" + light_overlay(plate, frame.object("camera"), estimate);
-            }
-            is_first = false;
+            body += comparison_html("frame-" + id, {"frame " + id, plate_path(workspace, id),
+                                                    workspace / "60_composite" / (id + ".png")});
         }
+        const JsonObject& first = list_of_frames.front();
+        body += "<h2>The light</h2>\n" + light_overlay(plate_path(workspace, first.text("id")),
+                                                       first.object("camera"), estimate);
     }
     body +=
         "<h2>What was measured</h2>\n<table><tr><th></th><th>kind</th><th>value</th><th></th>"
@@ -175,9 +176,10 @@ void write_insertion_report(const fs::path& workspace, const std::string& captur
         body +=
             "<h2>Stages</h2>\n<table><tr><th>stage</th><th>seconds</th><th>peak memory, "
             "MB</th></tr>\n";
-        for (const std::string& name : stages.keys()) {
+        for (const char* name : {"reconstruct", "candidates", "lights", "materials", "insert"}) {
+            if (!stages.has(name)) continue;
             const JsonObject stage = stages.object(name);
-            body += row({escape_html(name), fmt::format("{:.1f}", stage.number("seconds")),
+            body += row({name, fmt::format("{:.1f}", stage.number("seconds")),
                          fmt::format("{:.0f}", stage.number("peak_mb"))});
         }
         body += "</table>\n";
