@@ -1,4 +1,5 @@
-// vitrine_reconstruction_quality [--out DIR] [--only objects|poses] [--threads N] [--verbose] CAPTURE...
+// vitrine_reconstruction_quality [--out DIR] [--only objects|poses] [--threads N] [--verbose]
+// CAPTURE...
 //
 // Prints, for captures with a truth/ folder, how far the reconstruction is from the truth: fused
 // surface, objects, silhouettes, hulls, poses. The library itself never reads truth/.
@@ -11,6 +12,7 @@
 #include "image/image_io.h"
 #include "math/statistics.h"
 #include "reconstruct/labelled_scene.h"
+#include "reconstruct/pose_refinement.h"
 #include "reconstruct/visual_hull.h"
 #include "trace/accel.h"
 
@@ -239,11 +241,77 @@ void report_surface(const fs::path& folder, const Capture& capture, const Scene&
         100 * within / double(points.size()));
 }
 
+struct PoseError {
+    double mean_mm, max_mm, mean_deg, max_deg;
+};
+
+/// After one rigid alignment of the camera centres and axes.
+PoseError pose_error(const Capture& capture, const std::vector<Camera>& cameras) {
+    std::vector<Vec3> ours, truth;
+    const auto mark = [](const Camera& c, std::vector<Vec3>& points) {
+        const Rigid3 world_from_camera = c.cam_from_world.inverse();
+        for (int k = -1; k < 3; ++k) {  // centre and a point on each axis: also turns count
+            points.push_back(world_from_camera * (k < 0 ? Vec3::Zero() : Vec3(Vec3::Unit(k))));
+        }
+    };
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        mark(cameras[i], ours);
+        mark(capture.frames[i].camera, truth);
+    }
+    const Rigid3 align = align_points(ours, truth);
+    PoseError e{0, 0, 0, 0};
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+        const double mm = 1e3 * (align * ours[4 * i] - truth[4 * i]).norm();
+        const Mat3 turn = align.rotation * cameras[i].cam_from_world.rotation.transpose() *
+                          capture.frames[i].camera.cam_from_world.rotation;
+        const double deg = degrees(std::abs(Eigen::AngleAxisd(turn).angle()));
+        e.mean_mm += mm / double(cameras.size());
+        e.mean_deg += deg / double(cameras.size());
+        e.max_mm = std::max(e.max_mm, mm);
+        e.max_deg = std::max(e.max_deg, deg);
+    }
+    return e;
+}
+
+void print_poses(const char* what, const PoseError& e, double seconds) {
+    std::printf("  poses %s: mean %.2f mm %.3f deg, max %.2f mm %.3f deg (%.1f s)\n", what,
+                e.mean_mm, e.mean_deg, e.max_mm, e.max_deg, seconds);
+}
+
+void report_poses(const Capture& capture) {
+    std::vector<Camera> exact, perturbed;
+    for (std::size_t i = 0; i < capture.frames.size(); ++i) {
+        exact.push_back(capture.frames[i].camera);
+        Rng rng(stream_key(11, i));
+        const auto direction = [&] {
+            const double z = 2 * rng.next_double() - 1, a = 2 * kPi * rng.next_double();
+            return Vec3(std::sqrt(1 - z * z) * std::cos(a), std::sqrt(1 - z * z) * std::sin(a), z);
+        };
+        Camera c = exact.back();
+        c.cam_from_world =
+            rigid_from_twist(radians(0.7) * direction(), 0.01 * direction()) * c.cam_from_world;
+        perturbed.push_back(c);
+    }
+    print_poses("perturbed by 1 cm, 0.7 deg", pose_error(capture, perturbed), 0);
+    Timer timer;
+    const PoseRefinement refined = refine_poses(capture, perturbed, {});
+    print_poses("  refined", pose_error(capture, refined.cameras), timer.seconds());
+    timer = {};
+    const PoseRefinement kept = refine_poses(capture, exact, {});
+    print_poses(kept.is_accepted ? "exact, refined (accepted)" : "exact, refined (kept)",
+                pose_error(capture, kept.cameras), timer.seconds());
+    PoseRefinementOptions always;
+    always.min_gain = -1;
+    print_poses("exact, refinement forced",
+                pose_error(capture, refine_poses(capture, exact, {}, always).cameras), 0);
+}
+
 void run(const fs::path& folder, const fs::path& out_root, const std::string& only) {
     const Capture capture = read_capture(folder);
     std::printf("%s\n", capture.name.c_str());
     const fs::path out = out_root.empty() ? fs::path() : out_root / capture.name;
     if (!out.empty()) fs::create_directories(out);
+    if (only.empty() || only == "poses") report_poses(capture);
     if (only.empty() || only == "objects") {
         const Timer timer;
         ScanOptions options;

@@ -7,6 +7,7 @@
 #include "reconstruct/appearance.h"
 #include "reconstruct/depth_classes.h"
 #include "reconstruct/fusion.h"
+#include "reconstruct/pose_refinement.h"
 #include "trace/depth_map.h"
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 namespace vitrine {
 namespace {
 
+constexpr std::size_t kMaxRefinedFrames = 300;  // one dense system of six unknowns a frame
 constexpr int kBadMargin_px = 3;  // silhouettes are a little wider than their bad depth
 
 std::vector<ImageF> depth_images(const Capture& capture) {
@@ -89,6 +91,31 @@ std::vector<Camera> cameras_of(const Capture& capture) {
     return cameras;
 }
 
+/// Improves the poses and writes down how far they moved.
+void refine(const Capture& capture, const Progress& progress, Scan& scan) {
+    if (scan.cameras.size() > kMaxRefinedFrames) {
+        scan.notes.push_back(
+            fmt::format("poses kept: {} frames are more than the {} that are "
+                        "refined together",
+                        scan.cameras.size(), kMaxRefinedFrames));
+        return;
+    }
+    const std::vector<Camera> before = scan.cameras;
+    const PoseRefinement refinement = refine_poses(capture, before, {}, {}, progress);
+    scan.cameras = refinement.cameras;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        const Rigid3 motion = scan.cameras[i].cam_from_world * before[i].cam_from_world.inverse();
+        scan.poses[i].moved_m =
+            (scan.cameras[i].centre_in_world() - before[i].centre_in_world()).norm();
+        scan.poses[i].turned_rad = std::abs(Eigen::AngleAxisd(motion.rotation).angle());
+    }
+    scan.notes.push_back(
+        refinement.is_accepted
+            ? fmt::format("poses refined: disagreement of the views {:.3f} -> {:.3f}",
+                          refinement.cost_before, refinement.cost_after)
+            : "poses kept: refining them would not make the views agree better");
+}
+
 }  // namespace
 
 Scan make_scan(const Capture& capture, const ScanOptions& options, const Progress& progress) {
@@ -98,8 +125,9 @@ Scan make_scan(const Capture& capture, const ScanOptions& options, const Progres
     Scan scan;
     scan.cameras = cameras_of(capture);
     for (const RgbdFrame& frame : capture.frames) scan.poses.push_back({.id = frame.id});
-    progress.update(0.0, "fusing depth");
+    if (options.poses == PoseMode::Refine) refine(capture, progress.part(0.0, 0.3), scan);
     const FusionOptions fusion{options.voxel_m, options.truncation_m, options.max_depth_m};
+    progress.update(0.3, "fusing depth");
     const std::vector<ImageF> depth = depth_images(capture);
     scan.mesh =
         without_small_pieces(fuse_twice(depth, scan.cameras, fusion), options.min_component_m2);
