@@ -1,9 +1,12 @@
 #include "base/error.h"
 #include "base/file.h"
+#include "base/rng.h"
 #include "geometry/camera.h"
 #include "geometry/mesh.h"
 #include "geometry/mesh_io.h"
+#include "geometry/plane.h"
 #include "geometry/primitives.h"
+#include "geometry/scalar_grid.h"
 
 #include <gtest/gtest.h>
 
@@ -107,6 +110,44 @@ TEST_F(MeshIo, LiesAreRefused) {
     write_text_file(folder_ / "c.obj", "v 0 0 0\nf 1 2 3\n");
     EXPECT_THROW(read_mesh(folder_ / "c.obj"), InputError);
     EXPECT_THROW(read_mesh(folder_ / "d.stl"), InputError);
+}
+
+TEST(ScalarGrid, SurfaceOfABallIsClosedAndInPlace) {
+    Box3 box;
+    box.extend(Vec3(-0.06, -0.06, -0.06));
+    box.extend(Vec3(0.06, 0.06, 0.06));
+    ScalarGrid grid(box, 0.004, 0.0f);
+    for (std::size_t i = 0; i < grid.values.size(); ++i) {
+        const Eigen::Vector3i c = grid.node_of(i);
+        grid.values[i] = static_cast<float>(grid.node(c.x(), c.y(), c.z()).norm() - 0.05);
+    }
+    EXPECT_NEAR(grid.sample(Vec3(0.031, 0.002, -0.013)), 0.0337 - 0.05, 5e-4);
+    const Mesh mesh = zero_surface(grid);
+    EXPECT_TRUE(find_defects(mesh).is_closed());
+    EXPECT_NEAR(volume(mesh), 4.0 / 3 * kPi * std::pow(0.05, 3), 0.01 * volume(mesh));
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+        EXPECT_NEAR(mesh.vertices[i].norm(), 0.05f, 4e-4f);
+        EXPECT_GT(mesh.normals[i].dot(mesh.vertices[i].normalized()), 0.99f);
+    }
+}
+
+TEST(Plane, FitIgnoresWhatStandsOnIt) {
+    std::vector<Vec3> points;
+    Rng rng(9);
+    const Vec3 normal = Vec3(0.1, -0.2, 1).normalized();
+    for (int i = 0; i < 3000; ++i) {
+        const auto u = [&] { return 2 * rng.next_double() - 1; };
+        Vec3 p(u(), u(), u());
+        p -= (normal.dot(p) - 0.3 - 1e-3 * u()) * normal;
+        if (i % 3 == 0) p += 0.5 * (0.1 + rng.next_double()) * normal;
+        points.push_back(p);
+    }
+    const PlaneFit fit = fit_plane(points, 0.01);
+    const double sign = fit.plane.normal.dot(normal) > 0 ? 1 : -1;
+    EXPECT_LT(angle_between(sign * fit.plane.normal, normal), 1e-3);
+    EXPECT_NEAR(sign * fit.plane.offset_m, 0.3, 3e-4);
+    EXPECT_GE(fit.inliers, 2000u);
+    EXPECT_EQ(fit_plane({}, 0.01).inliers, 0u);
 }
 
 }  // namespace

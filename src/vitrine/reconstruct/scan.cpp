@@ -122,6 +122,12 @@ Scan make_scan(const Capture& capture, const ScanOptions& options, const Progres
     if (capture.frames.empty()) {
         throw InputError({capture.name, "at least one frame", "none", ""});
     }
+    if (!capture.has_poses || options.poses == PoseMode::Track) {
+        throw InputError({capture.name, "camera poses (groundtruth.txt)",
+                          capture.has_poses ? "the wish to find them from the frames" : "none",
+                          "poses cannot be found from the frames alone: give a trajectory and use "
+                          "--poses refine or keep"});
+    }
     Scan scan;
     scan.cameras = cameras_of(capture);
     for (const RgbdFrame& frame : capture.frames) scan.poses.push_back({.id = frame.id});

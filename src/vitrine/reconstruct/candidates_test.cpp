@@ -1,0 +1,90 @@
+#include "base/parallel.h"
+#include "image/filter.h"
+#include "reconstruct/labelled_scene.h"
+#include "reconstruct/tiny_world.h"
+#include "trace/accel.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+namespace vitrine {
+namespace {
+
+ScanOptions kept_poses() {
+    ScanOptions options;
+    options.poses = PoseMode::Keep;
+    return options;
+}
+
+TEST(Candidates, NoneAmongDiffuseThings) {
+    TinyWorldOptions options;
+    options.has_liar = false;
+    const TinyWorld world = make_tiny_world(options);
+    const Scan scan = make_scan(world.capture, kept_poses());
+    EXPECT_TRUE(find_candidates(world.capture, scan).objects.empty());
+}
+
+TEST(Candidates, FindsTheOneObjectWhoseDepthLies) {
+    const TinyWorld world = make_tiny_world();
+    const Scan scan = make_scan(world.capture, kept_poses());
+    CandidateOptions options;
+    options.hull_spacing_m = 0.002;
+    const Candidates candidates = find_candidates(world.capture, scan, options);
+    ASSERT_EQ(candidates.objects.size(), 1u);
+    const Candidate& ball = candidates.objects[0];
+    double sum = 0;
+    for (std::size_t i = 0; i < world.liar_masks.size(); ++i) {
+        sum += intersection_over_union(ball.silhouettes[i], world.liar_masks[i]);
+    }
+    EXPECT_GT(sum / double(world.liar_masks.size()), 0.93);
+    EXPECT_TRUE(find_defects(ball.hull).is_closed());
+    EXPECT_TRUE(ball.revolution.is_found);
+    EXPECT_LT((ball.revolution.axis_point - Vec3(0, 0, 0)).norm(), 1e-3);
+    EXPECT_NEAR(volume(ball.hull), 4.0 / 3 * kPi * std::pow(0.04, 3), 0.1 * volume(ball.hull));
+
+    const Scene scene = build_scene(scan, candidates);
+    ASSERT_EQ(scene.parts.size(), 2u);
+    EXPECT_EQ(scene.parts[0].name, "scan");
+    EXPECT_EQ(scene.parts[1].name, ball.id);
+    // Under and behind the ball the table is whole and flat.
+    const Accel accel(std::vector<AccelPart>{{scene.parts[0].mesh}});
+    for (double a = 0; a < 2 * kPi; a += 0.5) {
+        const Vec3f from(static_cast<float>(0.03 * std::cos(a)),
+                         static_cast<float>(0.03 * std::sin(a)), 0.1f);
+        const Hit hit = accel.closest({from, Vec3f(0, 0, -1)});
+        ASSERT_TRUE(hit.is_hit());
+        EXPECT_NEAR(hit.distance, 0.1f, 1e-3f);
+        EXPECT_GT(hit.normal.z(), 0.999f);
+    }
+}
+
+TEST(Candidates, SameBitsForAnyThreadCount) {
+    TinyWorldOptions small;
+    small.views = 6;
+    small.width = 160;
+    small.height = 120;
+    const TinyWorld world = make_tiny_world(small);
+    CandidateOptions options;
+    options.hull_spacing_m = 0.003;
+    std::vector<Vec3f> first;
+    for (const int threads : {1, 2}) {
+        set_thread_count(threads);
+        const Scan scan = make_scan(world.capture);
+        const Candidates candidates = find_candidates(world.capture, scan, options);
+        std::vector<Vec3f> all = scan.mesh.vertices;
+        for (const Candidate& c : candidates.objects) {
+            all.insert(all.end(), c.hull.vertices.begin(), c.hull.vertices.end());
+        }
+        if (threads == 1) {
+            first = all;
+        } else {
+            ASSERT_EQ(all.size(), first.size());
+            EXPECT_EQ(std::memcmp(all.data(), first.data(), all.size() * sizeof(Vec3f)), 0);
+        }
+    }
+    set_thread_count(0);
+}
+
+}  // namespace
+}  // namespace vitrine
