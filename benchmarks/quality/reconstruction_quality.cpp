@@ -1,4 +1,4 @@
-// vitrine_reconstruction_quality [--out DIR] [--only objects|poses] [--threads N] [--verbose]
+// vitrine_reconstruction_quality [--out DIR] [--only objects|poses|track] [--threads N] [--verbose]
 // CAPTURE...
 //
 // Prints, for captures with a truth/ folder, how far the reconstruction is from the truth: fused
@@ -13,6 +13,7 @@
 #include "math/statistics.h"
 #include "reconstruct/labelled_scene.h"
 #include "reconstruct/pose_refinement.h"
+#include "reconstruct/tracking.h"
 #include "reconstruct/visual_hull.h"
 #include "trace/accel.h"
 
@@ -306,12 +307,31 @@ void report_poses(const Capture& capture) {
                 pose_error(capture, refine_poses(capture, exact, {}, always).cameras), 0);
 }
 
+void report_tracking(const Capture& capture) {
+    const Timer timer;
+    const Tracking tracking = track_poses(capture);
+    std::string lost;
+    for (std::size_t i = 0; i < tracking.is_tracked.size(); ++i) {
+        if (!tracking.is_tracked[i]) lost += " " + capture.frames[i].id;
+    }
+    if (!lost.empty()) {
+        std::printf("  tracking refused: no connection to%s\n", lost.c_str());
+        return;
+    }
+    print_poses("tracked", pose_error(capture, tracking.cameras), timer.seconds());
+    const PoseRefinement refined = refine_poses(capture, tracking.cameras, {});
+    print_poses("tracked and refined", pose_error(capture, refined.cameras), timer.seconds());
+    std::printf("    disagreement of the views %.3f -> %.3f\n", refined.cost_before,
+                refined.cost_after);
+}
+
 void run(const fs::path& folder, const fs::path& out_root, const std::string& only) {
     const Capture capture = read_capture(folder);
     std::printf("%s\n", capture.name.c_str());
     const fs::path out = out_root.empty() ? fs::path() : out_root / capture.name;
     if (!out.empty()) fs::create_directories(out);
     if (only.empty() || only == "poses") report_poses(capture);
+    if (only.empty() || only == "track") report_tracking(capture);
     if (only.empty() || only == "objects") {
         const Timer timer;
         ScanOptions options;

@@ -8,6 +8,7 @@
 #include "reconstruct/depth_classes.h"
 #include "reconstruct/fusion.h"
 #include "reconstruct/pose_refinement.h"
+#include "reconstruct/tracking.h"
 #include "trace/depth_map.h"
 
 #include <algorithm>
@@ -16,6 +17,7 @@ namespace vitrine {
 namespace {
 
 constexpr std::size_t kMaxRefinedFrames = 300;  // one dense system of six unknowns a frame
+constexpr double kMaxDisagreement = 1.0;        // robust cost per comparison; noise alone gives 0.3
 constexpr int kBadMargin_px = 3;  // silhouettes are a little wider than their bad depth
 
 std::vector<ImageF> depth_images(const Capture& capture) {
@@ -91,6 +93,36 @@ std::vector<Camera> cameras_of(const Capture& capture) {
     return cameras;
 }
 
+/// Finds the poses from the frames.
+/// @throws InputError naming the frames that do not connect to the others
+void track(const Capture& capture, const Progress& progress, Scan& scan) {
+    const Tracking tracking = track_poses(capture, {}, progress);
+    std::string lost;
+    std::size_t lost_count = 0;
+    for (std::size_t i = 0; i < tracking.is_tracked.size(); ++i) {
+        if (tracking.is_tracked[i]) continue;
+        ++lost_count;
+        if (lost_count <= 10) lost += (lost.empty() ? "" : ", ") + capture.frames[i].id;
+    }
+    if (lost_count > 0) {
+        throw InputError({capture.name, "frames that share enough texture to find their poses",
+                          fmt::format("{} of {} frames without a connection to the first: {}",
+                                      lost_count, capture.frames.size(), lost),
+                          "take more views between them, add texture, or give a trajectory"});
+    }
+    scan.cameras = tracking.cameras;
+    scan.notes.push_back("poses found from the frames alone");
+}
+
+/// Turns the world so that the support plane is z = 0 and up is +z.
+void set_upright(Scan& scan) {
+    const Rigid3 upright_from_world = plane_from_world(scan.support_plane);
+    for (Camera& camera : scan.cameras) {
+        camera.cam_from_world = camera.cam_from_world * upright_from_world.inverse();
+    }
+    scan.support_plane = Plane();
+}
+
 /// Improves the poses and writes down how far they moved.
 void refine(const Capture& capture, const Progress& progress, Scan& scan) {
     if (scan.cameras.size() > kMaxRefinedFrames) {
@@ -109,6 +141,13 @@ void refine(const Capture& capture, const Progress& progress, Scan& scan) {
             (scan.cameras[i].centre_in_world() - before[i].centre_in_world()).norm();
         scan.poses[i].turned_rad = std::abs(Eigen::AngleAxisd(motion.rotation).angle());
     }
+    if (refinement.comparisons > 0 && refinement.cost_after > kMaxDisagreement) {
+        scan.notes.push_back(fmt::format(
+            "the views still disagree after refinement ({:.2f}, good is below {:.1f}): poses, "
+            "intrinsics or depth are wrong",
+            refinement.cost_after, kMaxDisagreement));
+        log_warning("{}", scan.notes.back());
+    }
     scan.notes.push_back(
         refinement.is_accepted
             ? fmt::format("poses refined: disagreement of the views {:.3f} -> {:.3f}",
@@ -122,22 +161,21 @@ Scan make_scan(const Capture& capture, const ScanOptions& options, const Progres
     if (capture.frames.empty()) {
         throw InputError({capture.name, "at least one frame", "none", ""});
     }
-    if (!capture.has_poses || options.poses == PoseMode::Track) {
-        throw InputError({capture.name, "camera poses (groundtruth.txt)",
-                          capture.has_poses ? "the wish to find them from the frames" : "none",
-                          "poses cannot be found from the frames alone: give a trajectory and use "
-                          "--poses refine or keep"});
-    }
     Scan scan;
     scan.cameras = cameras_of(capture);
     for (const RgbdFrame& frame : capture.frames) scan.poses.push_back({.id = frame.id});
-    if (options.poses == PoseMode::Refine) refine(capture, progress.part(0.0, 0.3), scan);
+    const bool has_start = capture.has_poses && options.poses != PoseMode::Track;
+    if (!has_start) track(capture, progress.part(0.0, 0.15), scan);
+    if (!has_start || options.poses == PoseMode::Refine) {
+        refine(capture, progress.part(0.15, 0.3), scan);
+    }
     const FusionOptions fusion{options.voxel_m, options.truncation_m, options.max_depth_m};
+    scan.support_plane = find_support_plane(capture, scan.cameras, options.max_depth_m);
+    if (!has_start) set_upright(scan);
     progress.update(0.3, "fusing depth");
     const std::vector<ImageF> depth = depth_images(capture);
     scan.mesh =
         without_small_pieces(fuse_twice(depth, scan.cameras, fusion), options.min_component_m2);
-    scan.support_plane = find_support_plane(capture, scan.cameras, options.max_depth_m);
     scan.mesh.normals = vertex_normals(scan.mesh);
     progress.update(0.6, "rendering the surface");
     const Accel accel(std::vector<AccelPart>{{std::make_shared<const Mesh>(scan.mesh)}});

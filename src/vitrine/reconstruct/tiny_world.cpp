@@ -17,8 +17,12 @@ Rgb texture(const Vec3& p) {
     };
     const double a = wave(61, 37, 53, 0.3) * wave(-29, 71, 31, 1.1);
     const double b = wave(17, -23, 41, 2.0) * wave(43, 11, -67, 0.7);
-    return Rgb(static_cast<float>(0.4 + 0.2 * a), static_cast<float>(0.4 + 0.2 * b),
-               static_cast<float>(0.35 + 0.1 * (a + b)));
+    // Blotches of random brightness give corners to hold on to.
+    const auto cell = [](double v) { return static_cast<std::int64_t>(std::floor(v / 0.017)); };
+    const std::uint64_t key = stream_key(3, cell(p.x() + 0.3 * p.y()), cell(p.y()), cell(p.z()));
+    const float blotch = 0.75f + 0.5f * Rng(key).next_float();
+    return blotch * Rgb(static_cast<float>(0.4 + 0.2 * a), static_cast<float>(0.4 + 0.2 * b),
+                        static_cast<float>(0.35 + 0.1 * (a + b)));
 }
 
 /// Holes over about half of the liar, different in every view.
