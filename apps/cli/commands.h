@@ -7,6 +7,7 @@ namespace vitrine::cli {
 
 void add_run_command(CLI::App& root);  ///< and the single stages of half A
 void add_check_command(CLI::App& root);
+void add_render_command(CLI::App& root);
 void add_evaluate_command(CLI::App& root);
 void add_transfer_command(CLI::App& root);
 

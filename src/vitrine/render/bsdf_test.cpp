@@ -1,0 +1,201 @@
+#include "render/bsdf.h"
+
+#include "base/rng.h"
+#include "math/rigid3.h"
+#include "math/sampling.h"
+#include "math/statistics.h"
+#include "render/light_sampler.h"
+#include "render/sampler.h"
+
+#include <gtest/gtest.h>
+
+namespace vitrine {
+namespace {
+
+struct Case {
+    std::string name;
+    Bsdf bsdf;
+};
+
+std::vector<Case> rough_materials() {
+    return {{"diffuse", DiffuseBsdf{Rgb(0.8f, 0.5f, 0.2f)}},
+            {"ward", WardBsdf{Rgb::Constant(0.3f), Rgb::Constant(0.3f), 0.25f, 0.25f, false}},
+            {"duer", WardBsdf{Rgb::Constant(0.1f), Rgb::Constant(0.5f), 0.15f, 0.15f, true}},
+            {"anisotropic", WardBsdf{Rgb::Constant(0.2f), Rgb::Constant(0.4f), 0.1f, 0.4f, false}}};
+}
+
+const Vec3f kViews[] = {Vec3f(0, 0, 1), Vec3f(0.5f, 0.2f, 0.8f).normalized(),
+                        Vec3f(-0.8f, 0.3f, 0.4f).normalized()};
+
+constexpr int kRows = 20, kColumns = 40;
+
+int cell_of(const Vec3f& d) {
+    const int row = std::min(kRows - 1, static_cast<int>(d.z() * kRows));
+    const float phi = std::atan2(d.y(), d.x()) + kPif;
+    return row * kColumns + std::min(kColumns - 1, static_cast<int>(phi / (2 * kPif) * kColumns));
+}
+
+// Pearson's test of the drawn directions against the density, integrated over each cell; samples
+// that end below the horizon are the share missing from one.
+TEST(Bsdf, SamplesFollowTheirDensity) {
+    constexpr int kDraws = 100000, kSub = 24;
+    int tests = 0;
+    for (const Case& c : rough_materials()) {
+        for (const Vec3f& wo : kViews) {
+            std::vector<double> observed(kRows * kColumns + 1, 0.0), expected(observed.size(), 0.0);
+            Rng rng(stream_key(7, ++tests));
+            for (int i = 0; i < kDraws; ++i) {
+                const Vec2f u(rng.next_float(), rng.next_float());
+                const BsdfSample s = sample(c.bsdf, wo, u, rng.next_float());
+                observed[s.pdf > 0 ? static_cast<std::size_t>(cell_of(s.wi)) : kRows * kColumns] +=
+                    1;
+            }
+            double sum = 0;
+            for (int r = 0; r < kRows * kSub; ++r) {
+                const float z = (static_cast<float>(r) + 0.5f) / (kRows * kSub);
+                for (int k = 0; k < kColumns * kSub; ++k) {
+                    const float phi =
+                        2 * kPif * (static_cast<float>(k) + 0.5f) / (kColumns * kSub) - kPif;
+                    const float rho = std::sqrt(1 - z * z);
+                    const double mass =
+                        pdf(c.bsdf, wo, Vec3f(rho * std::cos(phi), rho * std::sin(phi), z)) * 2 *
+                        kPi / (double(kRows) * kColumns * kSub * kSub);
+                    expected[static_cast<std::size_t>(r / kSub * kColumns + k / kSub)] +=
+                        mass * kDraws;
+                    sum += mass;
+                }
+            }
+            EXPECT_LT(sum, 1.005) << c.name;
+            expected.back() = std::max(0.0, 1 - sum) * kDraws;
+            // The remainder is known to the error of the integral only: leave it out when tiny.
+            if (expected.back() < 0.005 * kDraws) {
+                observed.pop_back();
+                expected.pop_back();
+            }
+            EXPECT_GT(chi_square_test(observed, expected).p_value, sidak(0.01, 12)) << c.name;
+        }
+    }
+}
+
+TEST(Bsdf, ReciprocalAndKeepsEnergy) {
+    for (const Case& c : rough_materials()) {
+        for (const Vec3f& wo : kViews) {
+            Rng rng(3);
+            Rgbd albedo = Rgbd::Zero();
+            constexpr int kDraws = 20000;
+            for (int i = 0; i < kDraws; ++i) {
+                const Vec2f u(rng.next_float(), rng.next_float());
+                const BsdfSample s = sample(c.bsdf, wo, u, rng.next_float());
+                if (s.pdf <= 0) continue;
+                albedo += s.weight.cast<double>() / kDraws;
+                const Rgb there = eval(c.bsdf, wo, s.wi), back = eval(c.bsdf, s.wi, wo);
+                EXPECT_LE((there - back).abs().maxCoeff(), 1e-4f * (there.maxCoeff() + 1e-3f));
+            }
+            EXPECT_LT(albedo.maxCoeff(), 1.02) << c.name;
+        }
+    }
+}
+
+TEST(Bsdf, DielectricSplitsByFresnel) {
+    int transmitted = 0;
+    constexpr int kDraws = 100000;
+    for (int i = 0; i < kDraws; ++i) {
+        const float u = (static_cast<float>(i) + 0.5f) / kDraws;
+        const BsdfSample s = sample(DielectricBsdf{1.5f}, Vec3f(0, 0, 1), Vec2f(0.5f, 0.5f), u);
+        transmitted += s.is_transmitted;
+        if (s.is_transmitted) {
+            EXPECT_NEAR(s.weight[0], 1 / 2.25f, 1e-5f);
+        }
+    }
+    EXPECT_NEAR(transmitted / double(kDraws), 0.96, 1e-4);
+}
+
+TEST(Sampler, PairsAreStratified) {
+    // 256 points: one in each cell of 16 x 16.
+    std::vector<int> count(256, 0);
+    for (std::uint32_t i = 0; i < 256; ++i) {
+        const Vec2f p = sobol_pair(i, 12345);
+        ++count[static_cast<std::size_t>(p.x() * 16) * 16 + static_cast<std::size_t>(p.y() * 16)];
+    }
+    for (const int c : count) EXPECT_EQ(c, 1);
+}
+
+// The irradiance that sampling a light gives, with the density it claims.
+TEST(Lights, DiscIrradianceIsTheClosedForm) {
+    // On the axis of a Lambertian disc: E = pi L r^2 / (r^2 + h^2) (Lambert).
+    const double r = 0.3, h = 0.5, radiance = 2.0;
+    const DiscLight disc{Vec3(0, 0, h), Vec3(0, 0, -1), r,
+                         Rgb::Constant(static_cast<float>(radiance * kPi * r * r))};
+    const LightSampler lights({disc}, Rgb::Zero());
+    double sum = 0;
+    constexpr std::uint32_t kDraws = 1 << 14;
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+        const auto s = lights.sample(0, Vec3f::Zero(), sobol_pair(i, 1));
+        ASSERT_TRUE(s);
+        sum += s->radiance_over_pdf[0] * s->direction.z() / kDraws;
+        EXPECT_NEAR(s->pdf / lights.pdf(0, Vec3f::Zero(), s->direction, s->distance), 1, 1e-4);
+        const auto hit = lights.hit(0, Vec3f::Zero(), s->direction, 10.0f);
+        if (hit) {
+            EXPECT_NEAR(hit->radiance[0], radiance, 1e-5);
+        }
+    }
+    EXPECT_NEAR(sum, kPi * radiance * r * r / (r * r + h * h), 0.002);
+}
+
+// Rays emitted towards a sphere carry what crosses it: 4 pi I times its share of the sky.
+TEST(Lights, EmittedPowerIsThatOfTheCone) {
+    const Sphere target{Vec3f(0, 0, 0), 0.05f}, scene{Vec3f(0, 0, 0), 2.0f};
+    const LightSampler lights(
+        {PointLight{Vec3(0, 0, 1), Rgb::Constant(2.0f)},
+         DirectionalLight{Vec3(0, 0.6, -0.8), Rgb::Constant(3.0f)},
+         DiscLight{Vec3(0, 0, 1), Vec3(0, 0, -1), 0.001, Rgb::Constant(2.0f)}},
+        Rgb::Zero());
+    const double solid_angle = cone_solid_angle(std::asin(0.05));
+    const double expected[] = {2 * solid_angle, 3 * kPi * 0.05 * 0.05, 2 * solid_angle};
+    for (std::size_t light = 0; light < 3; ++light) {
+        double power = 0;
+        constexpr std::uint32_t kDraws = 4096;
+        for (std::uint32_t i = 0; i < kDraws; ++i) {
+            power += lights.emit(light, target, sobol_pair(i, 1), sobol_pair(i, 2), scene).power[0];
+        }
+        EXPECT_NEAR(power / kDraws / expected[light], 1.0, 2e-3) << light;
+    }
+}
+
+TEST(Lights, EnvironmentSamplesFollowTheirDensity) {
+    auto map = std::make_shared<ImageRgb>(16, 8);
+    for (int y = 0; y < 8; ++y) {
+        for (int x = 0; x < 16; ++x) {
+            (*map)(x, y) = Rgb::Constant(static_cast<float>(1 + (x * 7 + y * 3) % 11));
+        }
+    }
+    const LightSampler lights({EnvironmentLight{map, "", 1.0}}, Rgb::Zero());
+    std::vector<double> observed(128, 0.0), expected(128, 0.0);
+    constexpr std::uint32_t kDraws = 50000;
+    Rng rng(9);
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+        const auto s = lights.sample(0, Vec3f::Zero(), Vec2f(rng.next_float(), rng.next_float()));
+        ASSERT_TRUE(s);
+        const float theta = std::acos(s->direction.z());
+        const float phi = std::atan2(s->direction.y(), s->direction.x()) + kPif;
+        const auto y = std::min<std::size_t>(7, static_cast<std::size_t>(theta / kPif * 8));
+        const auto x = std::min<std::size_t>(15, static_cast<std::size_t>(phi / (2 * kPif) * 16));
+        observed[y * 16 + x] += 1;
+    }
+    for (std::size_t y = 0; y < 8; ++y) {
+        const double top = std::cos(kPi * double(y) / 8), low = std::cos(kPi * double(y + 1) / 8);
+        for (std::size_t x = 0; x < 16; ++x) {
+            const double theta = std::acos(0.5 * (top + low));
+            const double phi = 2 * kPi * (double(x) + 0.5) / 16 - kPi;
+            const Vec3f d = Vec3(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                 std::cos(theta))
+                                .cast<float>();
+            expected[y * 16 + x] =
+                kDraws * lights.pdf(0, Vec3f::Zero(), d, 1e30f) * 2 * kPi / 16 * (top - low);
+        }
+    }
+    EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
+}
+
+}  // namespace
+}  // namespace vitrine
