@@ -129,7 +129,7 @@ Irradiance irradiance_of(const EstimationScene& world, const Mesh& mesh, const R
         for (int k = 0; k < world.object_count(); ++k) {
             if ((object_mask(k) & clear) == 0) continue;
             const ObjectEstimate& object = estimate.objects[at(k)];
-            CausticOptions options;
+            TrialCaustic options;
             options.ior = object.ior.value;
             options.sigma_a_per_m = object.sigma_a_per_m.value;
             options.is_shell = object.is_hollow;
@@ -213,6 +213,16 @@ Mesh with_albedo(const EstimationScene& world, const Scene& scene, const Mesh& r
         weight[i] = seen[i] ? 1.0f / (0.0009f + doubt * doubt) : 0.0f;
         if (doubt > kWildDoubt) weight[i] *= 0.02f;  // a wrong model, not noise: leave it to others
     }
+    // What no camera saw starts from the mean: a piece without a seen neighbour keeps it.
+    Rgb sum = Rgb::Zero();
+    float total = 0.0f;
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (weight[i] >= kCertainWeight) {
+            sum += log_albedo[i];
+            total += 1.0f;
+        }
+    for (std::size_t i = 0; i < points.size(); ++i)
+        if (weight[i] == 0.0f && total > 0.0f) log_albedo[i] = sum / total;
     diffuse_albedo(rings, weight, log_albedo);
     for (std::size_t i = 0; i < points.size(); ++i)
         mesh.colours[i] = log_albedo[i].exp().max(kMinAlbedo).min(kMaxAlbedo);

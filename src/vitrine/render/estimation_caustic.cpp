@@ -19,7 +19,7 @@ struct Photon {
 };
 
 Photon shoot(const EstimationScene& scene, int object, const TrialLight& light, std::uint64_t index,
-             std::uint32_t opaque_mask, const CausticOptions& options) {
+             std::uint32_t opaque_mask, const TrialCaustic& options) {
     Photon photon;
     const Frame lamp(light.normal.cast<float>());
     const Box3& box = scene.object_bounds(object);
@@ -77,7 +77,7 @@ Cell cell_of(const Vec3f& p, float size) {
 
 std::vector<Rgb> caustic_irradiance(const EstimationScene& scene, int object,
                                     const TrialLight& light, std::span<const SurfacePoint> points,
-                                    std::uint32_t opaque_mask, const CausticOptions& options) {
+                                    std::uint32_t opaque_mask, const TrialCaustic& options) {
     std::vector<Photon> photons(static_cast<std::size_t>(options.photon_count));
     parallel_for(photons.size(), 1024, [&](std::size_t i) {
         photons[i] = shoot(scene, object, light, i, opaque_mask, options);

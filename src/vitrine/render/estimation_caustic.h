@@ -8,7 +8,7 @@
 
 namespace vitrine {
 
-struct CausticOptions {
+struct TrialCaustic {
     double ior = 1.5;
     Rgb sigma_a_per_m = Rgb::Zero();
     bool is_shell = false;   ///< thin-walled: straight through
@@ -25,6 +25,6 @@ struct CausticOptions {
 /// Costs about 1.5 us per photon and core.
 std::vector<Rgb> caustic_irradiance(const EstimationScene& scene, int object,
                                     const TrialLight& light, std::span<const SurfacePoint> points,
-                                    std::uint32_t opaque_mask, const CausticOptions& options);
+                                    std::uint32_t opaque_mask, const TrialCaustic& options);
 
 }  // namespace vitrine
