@@ -21,6 +21,8 @@ constexpr float kMinLength = 0.005f;  // metres: shorter ways tell nothing of ab
 // Resampled views share the hull's errors; the residual they leave tells how large those are.
 constexpr double kIorDoubtPerCost = 0.35;
 constexpr double kAbsorptionDoubt = 0.15;  // per metre: gain errors of 1 % over 7 cm
+// Over an even background every index predicts about the same picture.
+constexpr double kMinCostContrast = 1.15;
 constexpr double kMinExplained = 0.15;
 constexpr double kDefaultWall = 0.0025;
 
@@ -188,10 +190,14 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     };
     std::vector<double> trial;
     std::vector<std::vector<ThroughPixel>> predicted;
+    double greatest = 0.0;
     const auto evaluate = [&](double ior) {
         predicted.push_back(look_through(scene, lookup, object, pixels, ior, options.ambient));
         trial.push_back(ior);
-        return cost_of(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
+        const double cost =
+            cost_of(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
+        greatest = std::max(greatest, cost);
+        return cost;
     };
     double best_ior = 0.0;
     if (options.known_ior) {
@@ -253,6 +259,9 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         fit.ior.outcome = fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
         fit.ior.reason = fit.sigma_a_per_m.reason =
             "too little of what is seen through the object is seen past it in another view";
+    } else if (!options.known_ior && greatest < kMinCostContrast * fit.cost) {
+        fit.ior.outcome = Outcome::NotIdentifiable;
+        fit.ior.reason = "the background is too even: it looks the same through any index";
     } else if (!options.known_ior && fit.ior.stddev > 0.1) {
         fit.ior.outcome = Outcome::Ambiguous;
         fit.ior.reason = "different views ask for different indices";
