@@ -177,12 +177,15 @@ int main(int argc, char** argv) {
     fs::path dump;
     TransferAnalysisOptions options;
     IrradianceSource irradiance = IrradianceSource::Photo;
+    TransferLook look;
     for (int i = 2; i + 1 < argc; i += 2) {
         const std::string name = argv[i], value = argv[i + 1];
         if (name == "--dump") dump = value;
         if (name == "--lights" && value == "lopez-moreno")
             options.light_method = LightMethod::LopezMoreno;
         if (name == "--solver" && value == "qmr") options.bssrdf.solver = ProfileSolver::Qmr;
+        if (name == "--highlights" && value == "phong")
+            look.highlights = HighlightTransfer::Phong, look.phong_exponent = 5;
         if (name == "--irradiance" && value == "lights") irradiance = IrradianceSource::Lights;
         if (name == "--coupling" && value == "free")
             options.bssrdf.coupling = ChannelCoupling::Free;
@@ -244,11 +247,26 @@ int main(int argc, char** argv) {
             dump_relief(dump / (name + "_true_relief.png"), truth.relief);
         }
         const TransferSession session(object, irradiance);
+        {
+            const RadialProfile profile = lifted.at("s1").medium.profile();
+            const Timer look_timer;
+            TransferLook brighter = look;
+            brighter.exposure = 1.1;
+            session.render(profile, brighter);
+            const double look_s = look_timer.seconds();
+            TransferSession relit(object, irradiance);
+            const Timer light_timer;
+            relit.set_lights(object.lights.lights);
+            relit.render(profile, brighter);
+            fmt::print(
+                "  change of look {:.2f} s (bar 0.15 at 1 Mpx), of light {:.2f} s (bar 0.3)\n",
+                look_s, light_timer.seconds());
+        }
         for (const std::string source : {"s1", "s3"}) {
             const LiftedMaterial& material = lifted.at(source);
             const double ratio = length_ratio(1, 1, truths.at(source).px_per_m, truth.px_per_m);
             const TransferPicture result =
-                session.render(material.medium.profile().scaled(ratio), {});
+                session.render(material.medium.profile().scaled(ratio), look);
             const std::string id = source + "_" + name;
             const ImageRgb exact = read_linear_rgb(folder / (id + ".png"));
             const ObjectScore ours = score_object(result.picture, exact, truth.photo.mask);

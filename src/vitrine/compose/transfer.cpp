@@ -131,6 +131,21 @@ TransferSession::TransferSession(PhotoAnalysis object, IrradianceSource irradian
     alpha_ = ImageF(mask.width(), mask.height());
     for (std::size_t i = 0; i < wide.size(); ++i) alpha_[i] = wide[i] > 127 ? 1.0f : 0.0f;
     alpha_ = gaussian_blur(alpha_, 1.0);
+    ImageF column(mask.width(), mask.height()), row(mask.width(), mask.height());
+    for (int y = 0; y < mask.height(); ++y) {
+        for (int x = 0; x < mask.width(); ++x) {
+            column(x, y) = static_cast<float>(x);
+            row(x, y) = static_cast<float>(y);
+        }
+    }
+    column = extend_nearest(column, mask);
+    row = extend_nearest(row, mask);
+    for (std::size_t i = 0; i < alpha_.size(); ++i) {
+        if (alpha_[i] <= 0 || mask[i] > 127) continue;
+        rim_.push_back(
+            {i, static_cast<std::size_t>(row[i]) * static_cast<std::size_t>(mask.width()) +
+                    static_cast<std::size_t>(column[i])});
+    }
 }
 
 void TransferSession::set_lights(const ViewLights& lights) {
@@ -212,7 +227,7 @@ TransferPicture TransferSession::render(const RadialProfile& profile,
     const ImageRgb highlights = highlight_layer(look);
     ImageRgb object(mask.width(), mask.height());
     for (std::size_t i = 0; i < mask.size(); ++i) object[i] = result.diffuse[i] + highlights[i];
-    object = extend_nearest(object, mask);
+    for (const auto& [outside, inside] : rim_) object[outside] = object[inside];
     result.picture = object_.photo.linear;
     for (std::size_t i = 0; i < mask.size(); ++i) {
         if (alpha_[i] <= 0) continue;

@@ -12,6 +12,7 @@
 #include "reconstruct/relief.h"
 #include "render/translucent_relief.h"
 
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -61,8 +62,8 @@ struct PhotoAnalysis {
 struct LiftedMaterial {
     PhotoAnalysis analysis;
     MediumEstimate medium;
-    double brightness = 1;  ///< the light is this much stronger than assumed (limit_albedo)
-    ImageRgb rendered;      ///< the material photo's object rendered with what was found
+    double brightness = 1;    ///< the light is this much stronger than assumed (limit_albedo)
+    ImageRgb rendered;        ///< the material photo's object rendered with what was found
     double self_psnr_db = 0;  ///< of that against the photo without highlights, encoded sRGB
     double flat_psnr_db = 0;  ///< of the best single colour, for comparison
 };
@@ -121,6 +122,7 @@ class TransferSession {
     ReliefIrradiance irradiance_;
     double level_ = 1;  ///< linear value of the photo where irradiance is pi on white
     ImageF alpha_;      ///< feathered mask
+    std::vector<std::array<std::size_t, 2>> rim_;  ///< feather pixel outside, nearest inside
 };
 
 /// The object recoloured as if opaque: albedo times irradiance over pi. The baseline.

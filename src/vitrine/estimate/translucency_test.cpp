@@ -1,0 +1,207 @@
+#include "base/parallel.h"
+#include "base/rng.h"
+#include "estimate/bssrdf.h"
+#include "estimate/highlight_light.h"
+#include "estimate/highlights.h"
+#include "estimate/lopez_moreno.h"
+#include "estimate/profile_fit.h"
+#include "estimate/translucency_lights.h"
+#include "estimate/translucent_world.h"
+
+#include <gtest/gtest.h>
+
+namespace vitrine {
+namespace {
+
+using testing_world::apple;
+using testing_world::ellipsoid;
+using testing_world::key_and_back;
+
+struct World {
+    Relief relief = ellipsoid(220, 100, 80);
+    ViewLights lights = key_and_back(relief, 1.3);
+    RadialProfile profile = apple(5);
+    ImageRgb diffuse =
+        TranslucentRelief(relief).render(irradiance_from_lights(relief, lights, 1.3), profile);
+
+    ImageRgb noisy() const {
+        ImageRgb image = diffuse;
+        for (std::size_t i = 0; i < image.size(); ++i) {
+            Rng rng(stream_key(7, i));
+            for (int c = 0; c < 3; ++c) image[i][c] *= 1 + 0.02f * (2 * rng.next_float() - 1);
+        }
+        return image;
+    }
+};
+
+double nearest_deg(const ViewLights& lights, const Vec3& direction) {
+    double best = 180;
+    for (const ViewLight& light : lights.lights)
+        best = std::min(best, degrees(angle_between(light.direction, direction)));
+    return best;
+}
+
+TEST(DistanceHistogram, GivesThePictureOfTheRenderer) {
+    const World world;
+    const ReliefSamples samples = sample_relief(world.relief, 3000);
+    const ReliefObservations observations = draw_observations(world.relief, Mask(), 300, 4, 0.5, 3);
+    const TwoExponentials fit{2e-3, -0.2, 1e-4, -0.05};
+    Eigen::MatrixXf source(static_cast<Eigen::Index>(samples.position.size()), 1);
+    for (std::size_t i = 0; i < samples.position.size(); ++i) {
+        double e = world.lights.ambient[0];
+        for (const ViewLight& light : world.lights.lights) {
+            e += light.intensity[0] * entering_irradiance(samples.normal[i], light.direction, 1.3);
+        }
+        source(static_cast<Eigen::Index>(i), 0) = static_cast<float>(e) * samples.area_px2[i];
+    }
+    const ReliefIrradiance irradiance = irradiance_from_lights(world.relief, world.lights, 1.3);
+    Eigen::MatrixXf local(static_cast<Eigen::Index>(observations.pixel.size()), 1);
+    for (std::size_t p = 0; p < observations.pixel.size(); ++p)
+        local(static_cast<Eigen::Index>(p), 0) = irradiance.front[observations.pixel[p]][0];
+    const DistanceHistogram histogram(observations, samples, source, local);
+    const Eigen::VectorXd image = histogram.image_of(fit).col(0);
+    TranslucentRenderOptions options;
+    options.eta = 1;  // no loss on the way out: exitance / pi
+    const ImageRgb rendered = TranslucentRelief(world.relief, options)
+                                  .render(irradiance, tabulate({fit, fit, fit}, 0.02, 400));
+    double error = 0;
+    for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
+        const double exact = rendered[observations.pixel[p]][0] * kPi;
+        error += std::abs(image[static_cast<Eigen::Index>(p)] / exact - 1);
+    }
+    EXPECT_LT(error / static_cast<double>(observations.pixel.size()), 0.006);
+}
+
+TEST(Bssrdf, KnownShapeAndLightsGiveTheProfile) {
+    const World world;
+    BssrdfOptions options;
+    options.use_shadows = false;
+    options.smoothing = 0.01;
+    const MediumEstimate found =
+        estimate_bssrdf(world.noisy(), world.relief, Mask(), world.lights, options);
+    const Rgbd albedo = world.profile.total();
+    for (int c = 0; c < 3; ++c) {
+        const auto k = static_cast<std::size_t>(c);
+        EXPECT_NEAR(found.channels[k].albedo / albedo[c], 1, 0.06) << c;
+        EXPECT_LT(profile_ks_distance(found.profile(), world.profile, c, 2.0, 250), 0.12) << c;
+    }
+    EXPECT_TRUE(found.dipole[0].has_value());
+    EXPECT_NEAR(found.channels[2].albedo / found.channels[0].albedo / (albedo[2] / albedo[0]), 1,
+                0.05);
+}
+
+TEST(Bssrdf, StepProfilesFallAndQmrAgreesInTotal) {
+    const World world;
+    BssrdfOptions options;
+    options.use_shadows = false;
+    const MediumEstimate monotone =
+        estimate_bssrdf(world.diffuse, world.relief, Mask(), world.lights, options);
+    for (std::size_t k = 1; k < monotone.piecewise.r.size(); ++k)
+        EXPECT_TRUE((monotone.piecewise.rd[k] <= monotone.piecewise.rd[k - 1] * 1.000001).all());
+    options.solver = ProfileSolver::Qmr;
+    const MediumEstimate qmr =
+        estimate_bssrdf(world.diffuse, world.relief, Mask(), world.lights, options);
+    EXPECT_NEAR(qmr.channels[0].albedo / monotone.channels[0].albedo, 1, 0.5);
+}
+
+TEST(Bssrdf, BlackChannelIsNotIdentifiable) {
+    World world;
+    for (Rgb& pixel : world.diffuse) pixel[2] = 0;
+    const MediumEstimate found = estimate_bssrdf(world.diffuse, world.relief, Mask(), world.lights);
+    EXPECT_EQ(found.channels[2].outcome, Outcome::NotIdentifiable);
+    EXPECT_FALSE(found.warnings.empty());
+    for (const Rgbd& rd : found.profile().rd) EXPECT_TRUE(rd.isFinite().all());
+}
+
+TEST(Bssrdf, LimitedAlbedoKeepsRatios) {
+    MediumEstimate medium;
+    for (std::size_t c = 0; c < 3; ++c) {
+        medium.fit[c] = {0.1 * (3.0 - static_cast<double>(c)), -0.7, 0, -1};
+        medium.channels[c].albedo = medium.fit[c].total();
+        medium.channels[c].mean_radius_px = medium.fit[c].mean_radius();
+    }
+    const double ratio = medium.channels[2].albedo / medium.channels[0].albedo;
+    EXPECT_GT(limit_albedo(medium), 1);
+    EXPECT_NEAR(medium.channels[0].albedo, kPlausibleAlbedo, 1e-9);
+    EXPECT_NEAR(medium.channels[2].albedo / medium.channels[0].albedo, ratio, 1e-9);
+}
+
+TEST(TranslucencyLights, KeyAndBackLightComeBack) {
+    const World world;
+    TranslucencyLightOptions options;
+    options.softness = 0.5;
+    const ViewLightsEstimate found =
+        estimate_translucency_lights(world.noisy(), world.relief, Mask(), {}, options);
+    EXPECT_LT(nearest_deg(found.lights, world.lights.lights[0].direction), 8);
+    EXPECT_LT(nearest_deg(found.lights, world.lights.lights[1].direction), 20);
+    EXPECT_LT(found.relative_residual, 0.1);
+}
+
+TEST(TranslucencyLights, SameBitsOnAnyThreadCount) {
+    const World world;
+    set_thread_count(1);
+    const auto one = estimate_translucency_lights(world.diffuse, world.relief, Mask(), {});
+    set_thread_count(0);
+    const auto all = estimate_translucency_lights(world.diffuse, world.relief, Mask(), {});
+    ASSERT_EQ(one.lights.lights.size(), all.lights.lights.size());
+    for (std::size_t l = 0; l < one.lights.lights.size(); ++l)
+        EXPECT_EQ(one.lights.lights[l].direction, all.lights.lights[l].direction);
+}
+
+TEST(TranslucencyLights, BlackPictureIsNotIdentifiable) {
+    World world;
+    for (Rgb& pixel : world.diffuse) pixel.setZero();
+    const auto found = estimate_translucency_lights(world.diffuse, world.relief, Mask(), {});
+    EXPECT_EQ(found.outcome, Outcome::NotIdentifiable);
+    EXPECT_FALSE(found.reason.empty());
+}
+
+TEST(LopezMoreno, FindsTheKeyOnALambertianBall) {
+    const Relief ball = ellipsoid(200, 90, 90);
+    const Vec3 light = Vec3(-0.6, 0.5, 0.62).normalized();
+    ImageRgb shaded(200, 200);
+    for (std::size_t i = 0; i < shaded.size(); ++i) {
+        if (ball.mask[i] <= 127) continue;
+        shaded[i] =
+            Rgb::Constant(0.02f + 0.6f * static_cast<float>(std::max(
+                                             0.0, ball.normals[i].cast<double>().dot(light))));
+    }
+    const ViewLightsEstimate found = estimate_lopez_moreno_lights(shaded, ball, Mask());
+    ASSERT_FALSE(found.lights.lights.empty());
+    EXPECT_LT(nearest_deg(found.lights, light), 22);  // about its published accuracy
+}
+
+TEST(Highlights, SpotIsFoundFilledAndPointsToItsLamp) {
+    World world;
+    const Vec3 lamp = world.lights.lights[0].direction;
+    const Vec3 half = (lamp + Vec3(0, 0, 1)).normalized();
+    ImageRgb photo = world.diffuse;
+    double brightest = 0;
+    for (const Rgb& pixel : photo) brightest = std::max<double>(brightest, pixel.maxCoeff());
+    for (std::size_t i = 0; i < photo.size(); ++i) {
+        if (world.relief.mask[i] <= 127) continue;
+        photo[i] *= static_cast<float>(0.5 / brightest);
+        world.diffuse[i] = photo[i];
+        const double lobe =
+            std::pow(std::max(0.0, world.relief.normals[i].cast<double>().dot(half)), 300);
+        photo[i] = (photo[i] + static_cast<float>(lobe)).min(1.0f);
+    }
+    const Highlights found = find_highlights(photo, world.relief.mask, 1.0);
+    ASSERT_EQ(found.blobs.size(), 1u);
+    const std::vector<ViewLight> lights = highlight_lights(found, world.relief);
+    EXPECT_LT(degrees(angle_between(lights[0].direction, lamp)), 4);
+    double worst = 0;
+    for (std::size_t i = 0; i < photo.size(); ++i)
+        worst = std::max<double>(worst, (found.diffuse[i] - world.diffuse[i]).abs().maxCoeff());
+    EXPECT_LT(worst, 0.12);
+}
+
+TEST(Highlights, MatteObjectHasNone) {
+    World world;
+    const Highlights found = find_highlights(world.diffuse, world.relief.mask, 1e30);
+    EXPECT_TRUE(found.blobs.empty());
+    EXPECT_EQ(found.method, HighlightMethod::None);
+}
+
+}  // namespace
+}  // namespace vitrine
