@@ -23,6 +23,11 @@ void print_lights(const TrueScene& truth, const LightEstimate& estimate) {
         estimate.error_initial, estimate.error_refined, estimate.residual_rms,
         estimate.ambient_radiance[1], truth.ambient_radiance[1], estimate.reference_point_m.x(),
         estimate.reference_point_m.y(), estimate.reference_point_m.z());
+    double grid_error = kPi;
+    for (const DiscLight& light : truth.lights)
+        grid_error = std::min(grid_error, angle_between(light.position_m - truth.reference_point_m,
+                                                        estimate.grid_direction));
+    std::printf("  best of the 36 grid lights: direction error %.2f deg\n", degrees(grid_error));
     for (const FittedLight& fitted : estimate.lights) {
         const DiscLight* nearest = nullptr;
         double error = 1e30;
