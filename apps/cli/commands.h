@@ -10,5 +10,6 @@ void add_check_command(CLI::App& root);
 void add_render_command(CLI::App& root);
 void add_evaluate_command(CLI::App& root);
 void add_transfer_command(CLI::App& root);
+void add_mlds_command(CLI::App& root);
 
 }  // namespace vitrine::cli

@@ -5,8 +5,8 @@
 int main(int argc, char** argv) {
     using namespace vitrine::cli;
     return run_main(argc, argv, [](CLI::App& root) {
-        for (const auto add :
-             {add_run_command, add_check_command, add_render_command, add_evaluate_command, add_transfer_command}) {
+        for (const auto add : {add_run_command, add_check_command, add_render_command,
+                               add_evaluate_command, add_transfer_command, add_mlds_command}) {
             add(root);
         }
     });

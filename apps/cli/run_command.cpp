@@ -3,6 +3,7 @@
 #include "command.h"
 #include "commands.h"
 #include "pipeline/insertion_recipe.h"
+#include "pipeline/ior_step.h"
 
 #include <cstdio>
 
@@ -10,7 +11,7 @@ namespace vitrine::cli {
 namespace {
 
 struct RunArguments {
-    std::string capture, out, poses = "refine", geometry, overrides, insertion, at,
+    std::string capture, out, poses = "refine", geometry, overrides, ior_step, insertion, at,
                               quality = "final";
     bool lambertian = false;
     std::uint64_t photon_count = 0;
@@ -26,6 +27,8 @@ InsertionRunOptions run_options(const RunArguments& arguments, std::uint64_t see
     options.lambertian = arguments.lambertian;
     options.geometry = arguments.geometry;
     options.overrides = arguments.overrides;
+    options.ior_step = arguments.ior_step;
+    if (!options.ior_step.empty()) read_ior_step(options.ior_step);  // wrong: known now, not later
     options.insertion = arguments.insertion;
     if (!arguments.at.empty()) {
         if (arguments.insertion.empty()) throw UsageError("--at needs --insert MESH");
@@ -87,6 +90,10 @@ void add_stage(CLI::App& root, const std::string& name, const std::string& summa
         command
             ->add_flag("--lambertian", arguments->lambertian,
                        "Take every object as diffuse (baseline for comparison)")
+            ->group("Quality");
+        command
+            ->add_option("--ior-step", arguments->ior_step,
+                         "Step of the index: a number, or scale.json of `mlds fit`")
             ->group("Quality");
     }
     if (last >= InsertionStage::Insert) {

@@ -211,6 +211,11 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
             best_ior =
                 options.ior_min +
                 options.ior_step * std::round((best_ior - options.ior_min) / options.ior_step);
+        if (!options.ior_grid.empty())
+            best_ior = *std::min_element(options.ior_grid.begin(), options.ior_grid.end(),
+                                         [free = best_ior](double a, double b) {
+                                             return std::abs(a - free) < std::abs(b - free);
+                                         });
         fit.ior.outcome = minimum.is_at_bound ? Outcome::AtBound : Outcome::Converged;
         if (minimum.is_at_bound) fit.ior.reason = "the best index lies at the end of the range";
     }

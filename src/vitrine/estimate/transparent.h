@@ -15,8 +15,9 @@ namespace vitrine {
 struct TransparentOptions {
     double ior_min = 1.20;  ///< as in the paper
     double ior_max = 2.00;
-    double ior_step = 0.0;   ///< > 0: answers only on this grid (the paper's lambda)
-    double shell_ior = 1.5;  ///< assumed for thin walls, which hardly bend light
+    double ior_step = 0.0;         ///< > 0: answers only on this grid (the paper's lambda)
+    std::vector<double> ior_grid;  ///< answers only on these (a lambda that varies), rising
+    double shell_ior = 1.5;        ///< assumed for thin walls, which hardly bend light
     Rgb ambient = Rgb::Zero();
     std::optional<double> known_ior;
     std::optional<Rgb> known_sigma_a;

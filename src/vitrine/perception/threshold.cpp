@@ -3,6 +3,8 @@
 #include "base/error.h"
 #include "perception/observer_model.h"
 
+#include <Eigen/Cholesky>
+
 #include <algorithm>
 #include <cmath>
 
@@ -26,6 +28,14 @@ std::vector<double> knots_through(std::span<const double> stimuli, int degrees_o
         knots.push_back(((1 - f) * stimuli[i] + f * stimuli[i + 1] - begin) / span);
     }
     return knots;
+}
+
+/// Log-likelihood to be gained by one scoring step: g' H^-1 g / 2.
+double score_gain(const Eigen::MatrixXd& design, const Eigen::VectorXd& score,
+                  const Eigen::VectorXd& weight) {
+    const Eigen::VectorXd gradient = design.transpose() * score;
+    const Eigen::MatrixXd information = design.transpose() * weight.asDiagonal() * design;
+    return 0.5 * gradient.dot(information.ldlt().solve(gradient));
 }
 
 }  // namespace
@@ -90,41 +100,48 @@ SmoothFitter::SmoothFitter(const QuestionCells& cells, std::span<const double> s
 }
 
 SmoothScale SmoothFitter::fit(const Eigen::VectorXd& ones) const {
-    const SmoothScale* best = nullptr;
-    const std::vector<SmoothScale> fitted = fit_all(ones);
-    for (const SmoothScale& scale : fitted) {
-        // A fit that did not settle is no evidence for a curve.
-        if (!best || (scale.has_converged && scale.bic < best->bic)) best = &scale;
+    SmoothScale best = fit_candidate(0, ones);
+    const double gain_per_parameter = 0.5 * std::log(std::max(1.0, answer_count_));
+    const Eigen::VectorXd eta = designs_[0] * best.coefficients;
+    Eigen::VectorXd score(eta.size()), weight(eta.size());
+    for (Eigen::Index i = 0; i < eta.size(); ++i) {
+        const AnswerProbability a = answer_probability(eta[i], lapse_);
+        score[i] = ones[i] * a.score_p - (answers_[i] - ones[i]) * a.score_q;
+        weight[i] = answers_[i] * a.information();
     }
-    return *best;
+    for (std::size_t i = 1; i < candidates_.size(); ++i) {
+        // Every spline contains the line, so its score test there (Rao 1948) foretells the gain in
+        // log-likelihood. Half of what the criterion asks is no hope worth a fit.
+        constexpr double kHopeless = 0.5;
+        const double needed = gain_per_parameter * static_cast<double>(i);
+        if (score_gain(designs_[i], score, weight) < kHopeless * needed) continue;
+        SmoothScale scale = fit_candidate(i, ones);
+        // A fit that did not settle is no evidence for a curve.
+        if (scale.has_converged && scale.bic < best.bic) best = std::move(scale);
+    }
+    return best;
 }
 
-std::vector<SmoothScale> SmoothFitter::fit_all(const Eigen::VectorXd& ones) const {
+SmoothScale SmoothFitter::fit_candidate(std::size_t index, const Eigen::VectorXd& ones) const {
     // A ridge far below the information of one answer keeps separated replicates finite.
     constexpr double kRidge = 1e-6;
-    std::vector<SmoothScale> fitted = candidates_;
-    BinomialData data;
-    data.answers = answers_;
-    data.ones = ones;
-    for (std::size_t i = 0; i < fitted.size(); ++i) {
-        SmoothScale& scale = fitted[i];
-        data.design = designs_[i];
-        const ProbitFit fit = fit_probit(
-            data, {.lapse = lapse_, .ridge = kRidge, .max_iterations = 40, .tolerance = 1e-7},
-            &candidates_[i].coefficients);
-        scale.coefficients = fit.beta;
-        scale.log_likelihood = fit.log_likelihood;
-        scale.has_converged = fit.has_converged;
-        scale.bic = -2 * fit.log_likelihood +
-                    scale.degrees_of_freedom() * std::log(std::max(1.0, answer_count_));
-    }
-    return fitted;
+    SmoothScale scale = candidates_[index];
+    const BinomialData data{designs_[index], answers_, ones};
+    const ProbitFit fit = fit_probit(
+        data, {.lapse = lapse_, .ridge = kRidge, .max_iterations = 40, .tolerance = 1e-7},
+        &candidates_[index].coefficients);
+    scale.coefficients = fit.beta;
+    scale.log_likelihood = fit.log_likelihood;
+    scale.has_converged = fit.has_converged;
+    scale.bic = -2 * fit.log_likelihood +
+                scale.degrees_of_freedom() * std::log(std::max(1.0, answer_count_));
+    return scale;
 }
 
 void SmoothFitter::start_from(const Eigen::VectorXd& ones) {
-    const std::vector<SmoothScale> fitted = fit_all(ones);
-    for (std::size_t i = 0; i < fitted.size(); ++i) {
-        if (fitted[i].has_converged) candidates_[i].coefficients = fitted[i].coefficients;
+    for (std::size_t i = 0; i < candidates_.size(); ++i) {
+        const SmoothScale scale = fit_candidate(i, ones);
+        if (scale.has_converged) candidates_[i].coefficients = scale.coefficients;
     }
 }
 

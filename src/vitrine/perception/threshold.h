@@ -61,7 +61,7 @@ class SmoothFitter {
     const Eigen::MatrixXd& design(const SmoothScale& scale) const;
 
   private:
-    std::vector<SmoothScale> fit_all(const Eigen::VectorXd& ones) const;
+    SmoothScale fit_candidate(std::size_t index, const Eigen::VectorXd& ones) const;
 
     std::vector<SmoothScale> candidates_;   ///< their coefficients are where fits start
     std::vector<Eigen::MatrixXd> designs_;  ///< cells x degrees of freedom

@@ -9,6 +9,7 @@
 #include "geometry/mesh_io.h"
 #include "image/colour.h"
 #include "image/image_io.h"
+#include "pipeline/ior_step.h"
 #include "pipeline/report.h"
 #include "pipeline/scan_files.h"
 #include "reconstruct/labelled_scene.h"
@@ -209,11 +210,26 @@ class InsertionRun {
         write_json_file(path, json);
     }
 
+    /// Where lambda varies the indices lie that far apart; else one step does.
+    void set_ior_step(EstimateOptions& options) const {
+        if (options_.ior_step.empty()) return;
+        const IorStep step = read_ior_step(options_.ior_step);
+        TransparentOptions& glass = options.materials.transparent;
+        if (step.local.empty()) {
+            glass.ior_step = step.value;
+        } else {
+            glass.ior_grid = ior_samples(step, glass.ior_min, glass.ior_max);
+        }
+    }
+
     void materials() {
         identity_ = workspace_.run_stage(
-            "materials", {identity_, options_.lambertian ? "lambertian" : "full"},
+            "materials",
+            {identity_, options_.lambertian ? "lambertian" : "full", options_.ior_step,
+             options_.ior_step.empty() ? "none" : hash_if_given(options_.ior_step)},
             [&] {
                 EstimateOptions options = estimate_options();
+                set_ior_step(options);
                 std::vector<DiscLight> start;
                 for (const FittedLight& fitted :
                      read_estimate(workspace_.path("30_lights.json")).light.lights) {

@@ -23,6 +23,7 @@ struct InsertionRunOptions {
     bool lambertian = false;          ///< every object diffuse: the baseline of the papers
     std::filesystem::path geometry;   ///< folder of PLY meshes that replace the hulls they overlap
     std::filesystem::path overrides;  ///< JSON of what the user knows
+    std::string ior_step;             ///< number or scale.json (ior_step.h); empty: no grid
     std::filesystem::path insertion;  ///< insertion file, or a mesh together with `at`
     std::optional<Placement> at;
     RenderQuality quality = RenderQuality::Final;

@@ -1,0 +1,169 @@
+#include "pipeline/mlds_presets.h"
+
+#include "base/error.h"
+#include "base/json_reader.h"
+#include "base/text.h"
+#include "geometry/primitives.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vitrine {
+namespace {
+
+constexpr int kPictureSize = 512;
+constexpr double kLightDistance = 1.5;  // metres, as in the paper's captures
+const Vec3 kTableCentre(0.02, 0.0, 0.02);
+
+Vec3 from_angles(double azimuth_deg, double elevation_deg, double distance) {
+    const double a = radians(azimuth_deg), e = radians(elevation_deg);
+    return distance * Vec3(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+}
+
+Camera make_camera() {
+    Camera camera;
+    camera.id = "000000";
+    camera.width = camera.height = kPictureSize;
+    camera.fx = camera.fy = 3.3 * kPictureSize;
+    camera.cx = camera.cy = 0.5 * (kPictureSize - 1);
+    const Vec3 eye = kTableCentre + from_angles(-90.0, 38.0, 0.72);
+    camera.cam_from_world = look_at(eye, kTableCentre, Vec3::UnitZ()).inverse();
+    return camera;
+}
+
+Part make_part(const std::string& name, Mesh mesh, Material material) {
+    if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
+    return {name, std::make_shared<const Mesh>(std::move(mesh)), std::move(material), "", false};
+}
+
+Mesh table() {
+    Mesh mesh = make_plane(1.6);
+    mesh.uv.clear();
+    return mesh;
+}
+
+Mesh lifted(const Mesh& mesh, double z) {
+    Mat4 move = Mat4::Identity();
+    move(2, 3) = z;
+    return transformed(mesh, move);
+}
+
+/// A solid bottle of clear glass, 13 cm high.
+Mesh bottle() {
+    const std::vector<Vec2> outline = {
+        {0.000, 0.000},  {0.022, 0.000}, {0.026, 0.004}, {0.028, 0.020},  {0.028, 0.045},
+        {0.027, 0.065},  {0.023, 0.080}, {0.015, 0.092}, {0.0105, 0.104}, {0.010, 0.118},
+        {0.0115, 0.123}, {0.010, 0.128}, {0.000, 0.129}};
+    // Rounded by a Catmull-Rom spline through the outline.
+    std::vector<Vec2> profile;
+    for (std::size_t i = 0; i + 1 < outline.size(); ++i) {
+        const Vec2& p0 = outline[i == 0 ? 0 : i - 1];
+        const Vec2 &p1 = outline[i], &p2 = outline[i + 1];
+        const Vec2& p3 = outline[std::min(i + 2, outline.size() - 1)];
+        constexpr int kSteps = 4;
+        for (int k = 0; k < kSteps; ++k) {
+            const double t = static_cast<double>(k) / kSteps;
+            Vec2 p = 0.5 * (2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t * t +
+                            (3 * p1 - p0 - 3 * p2 + p3) * t * t * t);
+            p.x() = std::max(p.x(), 0.0);
+            profile.push_back(p);
+        }
+    }
+    profile.push_back(outline.back());
+    return make_lathe(profile, 64);
+}
+
+/// A fluted cup with a thick floor: open, so the profile runs up outside and down inside.
+Mesh cup() {
+    std::vector<Vec2> profile = {{0.0, 0.0}};
+    constexpr int kSteps = 14;
+    for (int k = 0; k <= kSteps; ++k) {
+        const double t = static_cast<double>(k) / kSteps;
+        profile.emplace_back(0.024 + 0.011 * t + 0.0035 * std::sin(kPi * t), 0.075 * t);
+    }
+    for (int k = kSteps; k >= 0; --k) {
+        const double t = static_cast<double>(k) / kSteps;
+        profile.emplace_back(0.0205 + 0.011 * t + 0.0035 * std::sin(kPi * t), 0.009 + 0.066 * t);
+    }
+    profile.emplace_back(0.0, 0.009);
+    return make_lathe(profile, 64);
+}
+
+/// The fine shape: a flattened ball with twelve spiral flutes, like a sea shell.
+Mesh shell() {
+    Mesh mesh = make_sphere(1.0, Vec3::Zero(), 56);
+    for (Vec3f& v : mesh.vertices) {
+        const Vec3 d = v.cast<double>().normalized();
+        const double around = std::atan2(d.y(), d.x()), belt = 1 - d.z() * d.z();
+        const double radius = 0.042 * (1 + 0.07 * belt * std::cos(12 * around + 5 * d.z()));
+        v = Vec3(radius * d.x(), radius * d.y(), 0.8 * radius * d.z()).cast<float>();
+    }
+    mesh.normals = vertex_normals(mesh);
+    return lifted(mesh, 0.8 * 0.042 + 0.001);
+}
+
+/// A table, glass on it, and dim light from all around.
+SeriesSpec on_table(const std::string& title, Mesh glass, Light light, double from, double to) {
+    SeriesSpec spec;
+    spec.title = title;
+    spec.part = "glass";
+    spec.ior = equal_steps(from, to, 10);
+    spec.scene.cameras.push_back(make_camera());
+    Diffuse diffuse;
+    diffuse.albedo = Rgb(0.62f, 0.60f, 0.56f);
+    spec.scene.parts.push_back(make_part("table", table(), diffuse));
+    spec.scene.parts.push_back(make_part("glass", std::move(glass), Dielectric{}));
+    spec.scene.lights.push_back(std::move(light));
+    spec.scene.ambient_radiance = Rgb::Constant(0.06f);
+    return spec;
+}
+
+}  // namespace
+
+std::vector<std::string> mlds_preset_names() {
+    return {"sphere_point", "bottle_point", "shell_disc", "cup_spot"};
+}
+
+SeriesSpec make_mlds_preset(const std::string& name) {
+    const auto towards_table = [](const Vec3& position) {
+        return (kTableCentre - position).normalized().eval();
+    };
+    if (name == "sphere_point") {
+        const Vec3 at = from_angles(165.0, 52.0, kLightDistance);
+        return on_table("Glass ball under a point light",
+                        make_sphere(0.035, Vec3(-0.02, 0, 0.0355), 44),
+                        PointLight{at, Rgb::Constant(2.2f)}, 1.400, 1.465);
+    }
+    if (name == "bottle_point") {
+        const Vec3 at = from_angles(172.0, 48.0, kLightDistance);
+        return on_table("Glass bottle under a point light", lifted(bottle(), 0.0005),
+                        PointLight{at, Rgb::Constant(2.2f)}, 1.500, 1.565);
+    }
+    if (name == "shell_disc") {
+        const Vec3 at = from_angles(160.0, 55.0, kLightDistance);
+        return on_table("Fluted glass under a small area light", shell(),
+                        DiscLight{at, towards_table(at), 0.03, Rgb::Constant(2.2f)}, 1.300, 1.380);
+    }
+    if (name == "cup_spot") {
+        const Vec3 at = from_angles(168.0, 50.0, kLightDistance);
+        return on_table("Glass cup under a spot light", lifted(cup(), 0.0005),
+                        SpotLight{at, towards_table(at), Rgb::Constant(2.2f), 30.0}, 1.300, 1.375);
+    }
+    throw InputError({"preset", "one of " + join(mlds_preset_names(), ", "), name, ""});
+}
+
+void write_mlds_presets(const std::filesystem::path& folder) {
+    for (const std::string& name : mlds_preset_names()) {
+        const SeriesSpec spec = make_mlds_preset(name);
+        write_scene(folder / name / "scene.json", spec.scene);
+        Json root;
+        root["schema"] = "vitrine.mlds_series/1";
+        root["title"] = spec.title;
+        root["scene"] = name + "/scene.json";
+        root["part"] = spec.part;
+        root["ior"] = spec.ior;
+        write_json_file(folder / (name + ".json"), root);
+    }
+}
+
+}  // namespace vitrine
