@@ -19,6 +19,7 @@ TEST(MldsPresets, StoredScenesAreTheOnesTheCodeMakes) {
             read_series_spec(fs::path(VITRINE_SOURCE_DIR) / "scenes/mlds" / (name + ".json"));
         EXPECT_EQ(stored.ior, made.ior) << name;
         EXPECT_EQ(stored.part, made.part);
+        EXPECT_EQ(stored.scene.cameras.front().fx, made.scene.cameras.front().fx) << name;
         ASSERT_EQ(stored.scene.parts.size(), made.scene.parts.size());
         for (std::size_t i = 0; i < made.scene.parts.size(); ++i) {
             const Mesh &a = *stored.scene.parts[i].mesh, &b = *made.scene.parts[i].mesh;
