@@ -23,6 +23,7 @@ constexpr int kBoxMargin_px = 25;      // of background around an object, to lea
 
 /// Everything about one object while it takes shape.
 struct Growing {
+    std::string id;
     VoxelCluster cluster;
     ScalarGrid body;                ///< negative inside
     std::vector<BodyImage> images;  ///< of the body, per view
@@ -104,6 +105,20 @@ ScalarGrid body_of_cluster(const ScalarGrid& grid, const VoxelCluster& cluster) 
     return smooth;
 }
 
+/// A box that the user gives counts as voted.
+VoxelCluster cluster_of_box(const ScalarGrid& grid, const Box3& box) {
+    VoxelCluster cluster;
+    for (std::size_t i = 0; i < grid.values.size(); ++i) {
+        const Eigen::Vector3i c = grid.node_of(i);
+        const Vec3 p = grid.node(c.x(), c.y(), c.z());
+        if (!box.contains(p)) continue;
+        cluster.nodes.push_back(i);
+        cluster.box.extend(p);
+    }
+    cluster.volume_m3 = double(cluster.nodes.size()) * std::pow(grid.spacing_m, 3);
+    return cluster;
+}
+
 void render(const SceneViews& views, double growth_m, Growing& object) {
     const Plane& support = views.scan->support_plane;
     object.images = render_body(views, hull_mesh(object.body, 0.0, 0.0, support),
@@ -162,8 +177,22 @@ void look_behind(const SceneViews& views, std::vector<Growing>& objects) {
     }
 }
 
-void draw_outlines(const SceneViews& views, const std::vector<Growing>& all, double slack_px,
-                   Growing& object) {
+/// The user's silhouette is taken as it is: all visible pixels, nothing hidden.
+void use_edit(const Mask& edit, const std::string& id, SilhouetteView& view) {
+    if (!edit.same_size(*view.colour)) {
+        throw InputError({"edited silhouette of " + id,
+                          fmt::format("{}x{} pixels", view.colour->width(), view.colour->height()),
+                          fmt::format("{}x{}", edit.width(), edit.height()),
+                          "edit the silhouette at the size of the pictures"});
+    }
+    view.expected = edit;
+    view.hidden = Mask(edit.width(), edit.height());
+    view.box = PixelBox::of(edit).grown(kBoxMargin_px, edit.width(), edit.height());
+    view.is_fixed = true;
+}
+
+void draw_outlines(const SceneViews& views, const CandidateOptions& options,
+                   const std::vector<Growing>& all, double slack_px, Growing& object) {
     for (std::size_t i = 0; i < views.count(); ++i) {
         SilhouetteView& view = object.views[i];
         view.expected = view.box.is_empty() ? Mask() : object.images[i].expected;
@@ -174,6 +203,8 @@ void draw_outlines(const SceneViews& views, const std::vector<Growing>& all, dou
             view.other = view.other.empty() ? other.images[i].expected
                                             : mask_or(view.other, other.images[i].expected);
         }
+        const auto edit = options.edited_silhouettes.find({object.id, views.capture->frames[i].id});
+        if (edit != options.edited_silhouettes.end()) use_edit(edit->second, object.id, view);
     }
     object.silhouettes = cut_silhouettes(object.views, views.capture->saturation_level,
                                          {.outline_slack_px = slack_px});
@@ -311,7 +342,17 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
         Growing object;
         object.cluster = cluster;
         object.body = body_of_cluster(votes.fraction, cluster);
+        object.id = fmt::format("object_{}", objects.size());
         bodies.push_back(grown(cluster.box, kGrowth_m));
+        objects.push_back(std::move(object));
+    }
+    for (const Box3& box : options.boxes) {
+        Growing object;
+        object.cluster = cluster_of_box(votes.fraction, box);
+        if (object.cluster.nodes.empty()) continue;
+        object.body = body_of_cluster(votes.fraction, object.cluster);
+        object.id = fmt::format("object_{}", objects.size());
+        bodies.push_back(grown(object.cluster.box, kGrowth_m));
         objects.push_back(std::move(object));
     }
     if (objects.empty()) {
@@ -326,7 +367,7 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
     for (int round = 0; round < options.rounds; ++round) {
         progress.update(0.5 + 0.4 * round / options.rounds, "drawing outlines");
         for (Growing& object : objects) {
-            draw_outlines(views, objects, round == 0 ? 10.0 : 6.0, object);
+            draw_outlines(views, options, objects, round == 0 ? 10.0 : 6.0, object);
             const bool is_last = round + 1 == options.rounds;
             carve_body(views, is_last ? options.hull_spacing_m : 0.003, object);
             render(views, kGrowth_m, object);
@@ -335,13 +376,8 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
     }
     for (Growing& object : objects) {
         Candidate candidate = finish(views, options, object);
+        candidate.id = object.id;
         if (!candidate.hull.empty()) result.objects.push_back(std::move(candidate));
-    }
-    std::stable_sort(
-        result.objects.begin(), result.objects.end(),
-        [](const Candidate& a, const Candidate& b) { return volume(a.hull) > volume(b.hull); });
-    for (std::size_t i = 0; i < result.objects.size(); ++i) {
-        result.objects[i].id = fmt::format("object_{}", i);
     }
     progress.update(1.0, "candidates done");
     return result;

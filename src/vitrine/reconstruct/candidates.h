@@ -35,7 +35,7 @@ struct Revolution {
 };
 
 struct Candidate {
-    std::string id;                  ///< object_0, object_1, ... by falling volume
+    std::string id;  ///< object_0, ...: by falling volume of bad depth, then the boxes given
     std::vector<Mask> silhouettes;   ///< visible pixels, one per frame; empty mask: not seen
     std::vector<Mask> hidden;        ///< pixels of its hull behind nearer surfaces; same layout
     Mesh hull;                       ///< closed, world, unit normals, resting on the support plane

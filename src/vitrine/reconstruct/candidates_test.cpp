@@ -59,6 +59,25 @@ TEST(Candidates, FindsTheOneObjectWhoseDepthLies) {
     }
 }
 
+TEST(Candidates, AnEditedSilhouetteWins) {
+    TinyWorldOptions small;
+    small.views = 6;
+    small.width = 160;
+    small.height = 120;
+    const TinyWorld world = make_tiny_world(small);
+    const Scan scan = make_scan(world.capture, kept_poses());
+    CandidateOptions options;
+    options.hull_spacing_m = 0.004;
+    options.edited_silhouettes[{"object_0", "000002"}] = erode(world.liar_masks[2], 2);
+    const Candidates candidates = find_candidates(world.capture, scan, options);
+    ASSERT_EQ(candidates.objects.size(), 1u);
+    EXPECT_EQ(intersection_over_union(candidates.objects[0].silhouettes[2],
+                                      erode(world.liar_masks[2], 2)),
+              1.0);
+    options.edited_silhouettes[{"object_0", "000002"}] = Mask(5, 5);
+    EXPECT_THROW(find_candidates(world.capture, scan, options), InputError);
+}
+
 TEST(Candidates, SameBitsForAnyThreadCount) {
     TinyWorldOptions small;
     small.views = 6;
