@@ -1,5 +1,6 @@
 #include "render/render_scene.h"
 
+#include "base/log.h"
 #include "base/parallel.h"
 
 #include <numeric>
@@ -91,6 +92,11 @@ void Media::leave(int part) {
 
 RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
     epsilon_ = static_cast<float>(ray_epsilon(scene_));
+    for (const Part& part : scene_.parts) {
+        if (std::holds_alternative<Translucent>(part.material)) {
+            log_warning("{}: translucent meshes are rendered as plain diffuse so far", part.name);
+        }
+    }
     accel_ = build_accel(scene_.parts);
     if (open_contact_gaps(scene_, accel_, epsilon_)) accel_ = build_accel(scene_.parts);
     lights_ = LightSampler(scene_.lights, scene_.ambient_radiance);
