@@ -96,7 +96,8 @@ HighlightScore score_highlight(const ImageRgb& picture, const ImageRgb& truth, c
             const std::size_t i = stack.back();
             stack.pop_back();
             blob.push_back(i);
-            const int x = static_cast<int>(i) % mask.width(), y = static_cast<int>(i) / mask.width();
+            const int x = static_cast<int>(i) % mask.width(),
+                      y = static_cast<int>(i) / mask.width();
             for (int j = -1; j <= 1; ++j) {
                 for (int k = -1; k <= 1; ++k) {
                     if (!is_inside(bright, x + k, y + j) || seen(x + k, y + j) > 0) continue;

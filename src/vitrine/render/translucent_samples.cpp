@@ -34,8 +34,7 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
     VITRINE_CHECK_GT(inside, 0u);
     ReliefSamples samples;
     // Whole pixels: cells of unequal size would alias narrow kernels.
-    samples.step_px =
-        std::max(1.0, std::round(std::sqrt(static_cast<double>(inside) / per_side)));
+    samples.step_px = std::max(1.0, std::round(std::sqrt(static_cast<double>(inside) / per_side)));
     samples.origin_x = x0;
     samples.origin_y = y0;
     const double step = samples.step_px;
