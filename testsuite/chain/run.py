@@ -1,10 +1,12 @@
 """The main job on the sample capture: it finds and measures what is there, gives the same files on one
 thread and on two, and survives being killed at any moment."""
 import filecmp
+import json
 import os
 import pathlib
 import random
 import re
+import shutil
 import signal
 import subprocess
 import time
@@ -95,5 +97,34 @@ err = process.communicate(timeout=60)[1]
 case.expect(process.returncode == 130, f"SIGINT ends with 130, got {process.returncode}")
 case.expect(time.monotonic() - stopped < 2.5, "SIGINT stops within 2 s")
 case.expect("goes on" in err, f"it says how to go on: {err}")
+
+# The bridge between the halves: a material lifted from a photo, worn by an object in the capture.
+bridge = case.scratch / "bridge"
+photos = pathlib.Path("data/photos")
+code, out, err = case.run(
+    "transfer", "--source", photos / "grapes.png", "--source-mask", photos / "grapes_mask.png",
+    "--target", photos / "bust.png", "--target-mask", photos / "bust_mask.png", "--out", bridge)
+case.expect(code in (0, 4), f"transfer ends well: exit {code}\n{out}{err}")
+shutil.copy("scenes/meshes/box.ply", bridge / "body.ply")
+
+
+def insertion(**scale):
+    body = {"mesh": "body.ply", "to_world": [.04, 0, 0, .05, 0, .04, 0, -.12, 0, 0, .04, .02,
+                                             0, 0, 0, 1],
+            "material": {"kind": "translucent", "file": "material.json", **scale}}
+    with open(bridge / "insertion.json", "w", encoding="utf-8") as file:
+        json.dump({"schema": "vitrine.insertion/1", "objects": [body], "frames": ["000003"]}, file)
+    return ["run", root, "--insert", bridge / "insertion.json", "--quality", "preview", "--out", whole]
+
+
+case.refused(insertion(), 3, "scale_px_per_m", "--object-size-m")
+pictures = []
+for scale in (7272, 727):
+    code, out, err = case.run(*insertion(scale_px_per_m=scale))
+    case.expect(code in (0, 4), f"insertion of a translucent body: exit {code}\n{out}{err}")
+    picture = whole / "60_composite" / "000003.png"
+    case.expect(picture.is_file(), "its picture is written")
+    pictures.append(picture.read_bytes())
+case.expect(pictures[0] != pictures[1], "the scale of the material counts")
 
 case.finish()

@@ -2,9 +2,11 @@
 #include "base/file.h"
 #include "base/rng.h"
 #include "geometry/camera.h"
+#include "geometry/even_samples.h"
 #include "geometry/mesh.h"
 #include "geometry/mesh_io.h"
 #include "geometry/plane.h"
+#include "geometry/point_grid.h"
 #include "geometry/primitives.h"
 #include "geometry/scalar_grid.h"
 
@@ -129,6 +131,40 @@ TEST(ScalarGrid, SurfaceOfABallIsClosedAndInPlace) {
         EXPECT_NEAR(mesh.vertices[i].norm(), 0.05f, 4e-4f);
         EXPECT_GT(mesh.normals[i].dot(mesh.vertices[i].normalized()), 0.99f);
     }
+}
+
+TEST(EvenSamples, NoTwoAreNearAndPatchesCoverTheSurface) {
+    const Mesh torus = make_torus(0.05, 0.02, Vec3::Zero());
+    const double spacing = 0.003, area = surface_area(torus);
+    const EvenSamples samples = sample_evenly(torus, spacing, 1);
+    EXPECT_NEAR(samples.size() * spacing * spacing / area, 1.0, 0.1);
+    double sum = 0;
+    for (const float a : samples.area_m2) {
+        sum += a;
+        EXPECT_GT(a, 0.0f);
+        EXPECT_LT(a, 3 * spacing * spacing);
+    }
+    EXPECT_NEAR(sum, area, 1e-5 * area);
+    const PointGrid grid(samples.points, static_cast<float>(spacing));
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        int near = 0;
+        grid.for_each_near(samples.points[i], [&](std::uint32_t k) {
+            near += (samples.points[k] - samples.points[i]).norm() < 0.76f * spacing;
+        });
+        EXPECT_EQ(near, 1);  // itself
+    }
+}
+
+TEST(EvenSamples, BothSidesOfAThinSheetGetTheirOwn) {
+    const Mesh sheet = make_box(Vec3(0.1, 0.1, 1e-4));
+    const EvenSamples samples = sample_evenly(sheet, 0.005, 1);
+    double top = 0, bottom = 0;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+        if (samples.normals[i].z() > 0.5f) top += samples.area_m2[i];
+        if (samples.normals[i].z() < -0.5f) bottom += samples.area_m2[i];
+    }
+    EXPECT_NEAR(top, 0.01, 1e-4);
+    EXPECT_NEAR(bottom, 0.01, 1e-4);
 }
 
 TEST(Plane, FitIgnoresWhatStandsOnIt) {

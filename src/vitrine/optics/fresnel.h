@@ -3,6 +3,8 @@
 
 #include "math/vector.h"
 
+#include <algorithm>
+
 namespace vitrine {
 
 /// Unpolarised Fresnel reflectance of a dielectric interface (Fresnel 1823, exact).
@@ -25,6 +27,15 @@ template <typename T>
 T fresnel_dielectric(T cos_i, T eta) {
     T cos_t;
     return fresnel_dielectric(cos_i, eta, cos_t);
+}
+
+/// Unpolarised transmittance into a medium of index `eta`, for a cosine on the outside; 0 from
+/// behind, 1 when eta = 1.
+template <typename T>
+T fresnel_transmittance(T cos_outside, T eta) {
+    if (cos_outside <= T(0)) return T(0);
+    if (eta == T(1)) return T(1);
+    return T(1) - fresnel_dielectric(std::min(cos_outside, T(1)), eta);
 }
 
 /// Mirror direction of `wo` (pointing away) about the unit normal.

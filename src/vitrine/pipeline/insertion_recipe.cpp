@@ -54,6 +54,9 @@ std::string insertion_identity(const InsertionRunOptions& options) {
     } else if (!options.insertion.empty() && fs::exists(options.insertion)) {
         for (const Part& part : read_insertion(options.insertion).objects) {
             text += " " + hash_if_given(options.insertion.parent_path() / part.mesh_file);
+            if (const auto* translucent = std::get_if<Translucent>(&part.material)) {
+                text += " " + hash_if_given(options.insertion.parent_path() / translucent->file);
+            }
         }
     }
     return text;

@@ -29,6 +29,23 @@ float ward_pdf(const WardBsdf& ward, const Vec3f& wo, const Vec3f& wi) {
     return std::exp(-tan2) / (4 * kPif * ward.sigma_x * ward.sigma_y * h.dot(wi) * cos2 * h.z());
 }
 
+/// Chance that a translucent face sends a path on by its diffuse lobe.
+float diffuse_share(const TranslucentBsdf& face) {
+    if (face.sigma <= 0) return 1.0f;
+    constexpr float kGlossyShare = 0.2f;  // reflects 3 to 5 %, more at grazing angles
+    return std::clamp(luminance(face.near_share), 0.0f, 1.0f) > 0 ? 1.0f - kGlossyShare : 0.0f;
+}
+
+/// The lobe of the interface as a Ward lobe; Fresnel's factor is put to it apart.
+WardBsdf gloss_of(const TranslucentBsdf& face) {
+    return {Rgb::Zero(), Rgb::Ones(), face.sigma, face.sigma, false};
+}
+
+float gloss_fresnel(const TranslucentBsdf& face, const Vec3f& wo, const Vec3f& wi) {
+    const Vec3f h = (wo + wi).normalized();
+    return 1.0f - fresnel_transmittance(wo.dot(h), face.eta);
+}
+
 Rgb ward_value(const WardBsdf& ward, const Vec3f& wo, const Vec3f& wi) {
     return ward.rho_s * static_cast<float>(ward_lobe(wo.cast<double>(), wi.cast<double>(),
                                                      ward.sigma_x, ward.sigma_y, ward.is_duer));
@@ -55,6 +72,16 @@ BsdfSample sample_ward_lobe(const WardBsdf& ward, const Vec3f& wo, const Vec2f& 
 
 }  // namespace
 
+Rgb diffuse_reflectance(const Bsdf& bsdf) {
+    if (const auto* d = std::get_if<DiffuseBsdf>(&bsdf)) return d->albedo;
+    if (const auto* w = std::get_if<WardBsdf>(&bsdf)) return w->rho_d;
+    if (const auto* t = std::get_if<TranslucentBsdf>(&bsdf)) {
+        const float through = fresnel_transmittance(1.0f, t->eta);
+        return t->near_share * (through * through);
+    }
+    return Rgb::Zero();
+}
+
 bool is_smooth(const Bsdf& bsdf) {
     return std::holds_alternative<MirrorBsdf>(bsdf) || std::holds_alternative<DielectricBsdf>(bsdf);
 }
@@ -69,7 +96,20 @@ Rgb eval_lobe(const Bsdf& bsdf, Lobe lobe, const Vec3f& wo, const Vec3f& wi) {
                        return lobe == Lobe::Diffuse ? Rgb(w.rho_d / kPif) : ward_value(w, wo, wi);
                    },
                    [](const MirrorBsdf&) -> Rgb { return Rgb::Zero(); },
-                   [](const DielectricBsdf&) -> Rgb { return Rgb::Zero(); }},
+                   [](const DielectricBsdf&) -> Rgb { return Rgb::Zero(); },
+                   [&](const TranslucentBsdf& t) -> Rgb {
+                       if (lobe == Lobe::Diffuse) {
+                           return t.near_share * (fresnel_transmittance(wi.z(), t.eta) *
+                                                  fresnel_transmittance(wo.z(), t.eta) / kPif);
+                       }
+                       if (t.sigma <= 0) return Rgb::Zero();
+                       return ward_value(gloss_of(t), wo, wi) * gloss_fresnel(t, wo, wi);
+                   },
+                   [&](const EnteringBsdf& e) -> Rgb {
+                       return lobe == Lobe::Diffuse
+                                  ? Rgb(Rgb::Constant(fresnel_transmittance(wi.z(), e.eta) / kPif))
+                                  : Rgb(Rgb::Zero());
+                   }},
         bsdf);
 }
 
@@ -78,7 +118,13 @@ Rgb eval(const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi) {
 }
 
 float lobe_probability(const Bsdf& bsdf, Lobe lobe) {
-    if (std::holds_alternative<DiffuseBsdf>(bsdf)) return lobe == Lobe::Diffuse ? 1.0f : 0.0f;
+    if (std::holds_alternative<DiffuseBsdf>(bsdf) || std::holds_alternative<EnteringBsdf>(bsdf)) {
+        return lobe == Lobe::Diffuse ? 1.0f : 0.0f;
+    }
+    if (const auto* face = std::get_if<TranslucentBsdf>(&bsdf)) {
+        const float share = diffuse_share(*face);
+        return lobe == Lobe::Diffuse ? share : 1.0f - share;
+    }
     if (const auto* ward = std::get_if<WardBsdf>(&bsdf)) {
         const float share = diffuse_share(*ward);
         return lobe == Lobe::Diffuse ? share : 1.0f - share;
@@ -89,6 +135,9 @@ float lobe_probability(const Bsdf& bsdf, Lobe lobe) {
 float pdf_lobe(const Bsdf& bsdf, Lobe lobe, const Vec3f& wo, const Vec3f& wi) {
     if (is_smooth(bsdf) || wo.z() <= 0 || wi.z() <= 0) return 0.0f;
     if (lobe == Lobe::Diffuse) return pdf_cosine_hemisphere(wi.z());
+    if (const auto* face = std::get_if<TranslucentBsdf>(&bsdf)) {
+        return face->sigma > 0 ? ward_pdf(gloss_of(*face), wo, wi) : 0.0f;
+    }
     const auto* ward = std::get_if<WardBsdf>(&bsdf);
     return ward ? ward_pdf(*ward, wo, wi) : 0.0f;
 }
@@ -115,6 +164,25 @@ BsdfSample sample(const Bsdf& bsdf, const Vec3f& wo, const Vec2f& u, float u_lob
                                      BsdfSample s = sample_ward_lobe(w, wo, u);
                                      s.weight /= 1.0f - share;
                                      s.pdf *= 1.0f - share;
+                                     return s;
+                                 },
+                                 [&](const TranslucentBsdf& t) {
+                                     const float share = diffuse_share(t);
+                                     if (u_lobe < share) {
+                                         BsdfSample s = diffuse(t.near_share, share);
+                                         s.weight *= fresnel_transmittance(s.wi.z(), t.eta) *
+                                                     fresnel_transmittance(wo.z(), t.eta);
+                                         return s;
+                                     }
+                                     BsdfSample s = sample_ward_lobe(gloss_of(t), wo, u);
+                                     if (!(s.pdf > 0)) return s;
+                                     s.weight *= gloss_fresnel(t, wo, s.wi) / (1.0f - share);
+                                     s.pdf *= 1.0f - share;
+                                     return s;
+                                 },
+                                 [&](const EnteringBsdf& e) {
+                                     BsdfSample s = diffuse(Rgb::Ones(), 1.0f);
+                                     s.weight *= fresnel_transmittance(s.wi.z(), e.eta);
                                      return s;
                                  },
                                  [&](const MirrorBsdf& m) {

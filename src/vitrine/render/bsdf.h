@@ -28,13 +28,29 @@ struct MirrorBsdf {
 struct DielectricBsdf {
     float eta = 1.5f;
 };
-using Bsdf = std::variant<DiffuseBsdf, WardBsdf, MirrorBsdf, DielectricBsdf>;
+/// The face of a translucent body (Jensen et al. 2001, Eq. 5): what its profile spreads too
+/// little for the body's samples to tell leaves like paint under a smooth interface; the rest is
+/// the body's exitance. A `sigma` above 0 adds the interface's own reflection, blurred.
+struct TranslucentBsdf {
+    Rgb near_share = Rgb::Zero();  ///< albedo of what is left to paint
+    float eta = 1.3f;              ///< inside / outside
+    float sigma = 0.0f;            ///< width of the glossy lobe, as Ward's; 0: none
+};
+/// Light on its way into a translucent body: F_t(wi) / pi, so that pi times the reflected radiance
+/// is the irradiance that enters.
+struct EnteringBsdf {
+    float eta = 1.3f;
+};
+using Bsdf =
+    std::variant<DiffuseBsdf, WardBsdf, MirrorBsdf, DielectricBsdf, TranslucentBsdf, EnteringBsdf>;
 
 /// The two parts of a material that scatters over a range of directions.
 enum class Lobe { Diffuse, Glossy };
 
 /// True when all light leaves in single directions.
 bool is_smooth(const Bsdf& bsdf);
+/// Share of perpendicular light that the diffuse lobe sends back.
+Rgb diffuse_reflectance(const Bsdf& bsdf);
 
 /// Value of one lobe in 1/sr.
 Rgb eval_lobe(const Bsdf& bsdf, Lobe lobe, const Vec3f& wo, const Vec3f& wi);

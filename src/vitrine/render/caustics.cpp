@@ -33,6 +33,9 @@ float bending_weight(const Material& material) {
     if (const auto* ward = std::get_if<Ward>(&material)) {
         return ward->rho_s.maxCoeff() > 0 ? 0.5f : 0.0f;
     }
+    if (const auto* translucent = std::get_if<Translucent>(&material)) {
+        return translucent->sigma > 0 ? 0.1f : 0.0f;  // its interface reflects 3 to 5 %
+    }
     return 0.0f;
 }
 
@@ -179,10 +182,10 @@ class Tracer {
             photon.power = flight.power;
             photon.to_light = PackedDirection(-flight.direction);
             photon.normal = PackedDirection(point.geometric_normal);
-            photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
+            photon.set_diffuse_albedo(diffuse_reflectance(bsdf));
             photon.views = static_cast<std::uint8_t>(view);
             photon.is_glossy = flight.is_glossy;
-            photon.keeps_direction = has_lobe;
+            photon.keeps_direction = !std::holds_alternative<DiffuseBsdf>(bsdf);
             arrivals.push_back(photon);
             if (!flight.has_arrived) balance.stored += flight.power.sum();
             flight.has_arrived = true;
@@ -275,8 +278,7 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
                               const Progress& progress) {
     CausticPhotons result;
     const Tracer tracer(scene, options);
-    const bool has_virtual = std::any_of(scene.scene().parts.begin(), scene.scene().parts.end(),
-                                         [](const Part& part) { return part.is_virtual; });
+    const bool has_virtual = scene.has_virtual();
     constexpr std::size_t kBlock = 8192;
     const std::vector<Target> targets = find_targets(scene, options);
     std::size_t done = 0;

@@ -31,10 +31,11 @@ RenderScene combine(Scene real, std::vector<Part> virtual_parts) {
 
 class FrameRenderer {
   public:
-    FrameRenderer(const RenderScene& scene, const CausticMaps& maps, const Camera& camera,
+    FrameRenderer(const RenderScene& scene, const CausticMaps& maps,
+                  const TranslucentLight& translucent, const Camera& camera,
                   const DifferentialOptions& options)
         : scene_(scene),
-          tracer_(scene, maps.empty() ? nullptr : &maps, options.paths),
+          tracer_(scene, maps.empty() ? nullptr : &maps, options.paths, &translucent),
           camera_(camera),
           origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
@@ -138,12 +139,16 @@ DifferentialRenderer::DifferentialRenderer(Scene real, std::vector<Part> virtual
     const CausticPhotons photons = trace_caustics(scene_, caustics, progress);
     balance_ = photons.balance;
     maps_ = build_caustic_maps(photons.photons, radius);
+    TranslucentLightOptions translucent;
+    translucent.seed = options.seed;
+    translucent_ = light_translucent_bodies(scene_, maps_.empty() ? nullptr : &maps_, options.paths,
+                                            translucent);
 }
 
 DifferentialImage DifferentialRenderer::render(const Camera& camera,
                                                const Progress& progress) const {
     const int width = camera.width, height = camera.height;
-    const FrameRenderer renderer(scene_, maps_, camera, options_);
+    const FrameRenderer renderer(scene_, maps_, translucent_, camera, options_);
     Image<PixelSums> sums(width, height, PixelSums{});
     constexpr int kBand = 16;
     const auto run = [&](const Progress& step, const auto& samples_of) {

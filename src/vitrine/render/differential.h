@@ -54,6 +54,7 @@ class DifferentialRenderer {
   private:
     RenderScene scene_;
     CausticMaps maps_;
+    TranslucentLight translucent_;
     PhotonBalance balance_;
     DifferentialOptions options_;
 };

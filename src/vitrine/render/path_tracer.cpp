@@ -1,5 +1,6 @@
 #include "render/path_tracer.h"
 
+#include "optics/fresnel.h"
 #include "render/interface.h"
 
 namespace vitrine {
@@ -46,8 +47,9 @@ struct PathTracer::Pending {
     int count = 0;
 };
 
-PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options)
-    : scene_(scene), caustics_(caustics), options_(options) {}
+PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
+                       const TranslucentLight* translucent)
+    : scene_(scene), caustics_(caustics), options_(options), translucent_(translucent) {}
 
 PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
                              const PathSampler& sampler, std::uint32_t view) const {
@@ -56,9 +58,33 @@ PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
     State& first = pending.states[pending.count++];
     first.origin = origin;
     first.direction = direction;
+    finish(pending, sampler, view, result);
+    return result;
+}
+
+void PathTracer::finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
+                        PathResult& result) const {
     while (pending.count > 0) {
         const State state = pending.states[--pending.count];
         follow(state, pending, sampler, view, result);
+    }
+}
+
+PathResult PathTracer::entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
+                                std::uint32_t view) const {
+    PathResult result;
+    Pending pending;
+    State& state = pending.states[0];
+    state.depth = 1;
+    const Bsdf bsdf = EnteringBsdf{eta};
+    const Frame frame(point.shading_normal);
+    const Vec3f wo(0, 0, 1);
+    add_direct(state, point, bsdf, frame, wo, sampler, view, result);
+    if (options_.direct_light_only) return result;
+    add_secondary(state, point, bsdf, sampler, view, result);
+    if (scatter(state, point, bsdf, frame, wo, sampler)) {
+        pending.count = 1;
+        finish(pending, sampler, view, result);
     }
     return result;
 }
@@ -105,6 +131,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
         if (!state.is_layer_fixed) {
             state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
         }
+        add_exitance(state, point, bsdf, wo, view, result);
         add_direct(state, point, bsdf, frame, wo, sampler, view, result);
         add_caustics(state, point, bsdf, frame, wo, view, result);
         if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
@@ -215,13 +242,18 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
     const std::uint8_t wanted =
         static_cast<std::uint8_t>(view == kAllParts ? kVirtualParts : kRealParts);
     Rgb irradiance = Rgb::Zero(), glossy = Rgb::Zero();
+    const bool is_translucent = std::holds_alternative<TranslucentBsdf>(bsdf);
     const bool has_glossy = !state.has_receiver && lobe_probability(bsdf, Lobe::Glossy) > 0;
     const auto visit = [&](const Photon& photon, float kernel) {
         if (view == kAllParts) result.is_touched |= photon.views != kAllParts;
         if (!(photon.views & wanted)) return;
-        irradiance += kernel * photon.power;
-        if (!has_glossy) return;
+        if (!is_translucent) irradiance += kernel * photon.power;
+        if (!has_glossy && !is_translucent) return;
         const Vec3f wi = frame.to_local(photon.to_light.unpack());
+        if (is_translucent) {  // what enters depends on the direction
+            glossy += kernel * photon.power * eval_lobe(bsdf, Lobe::Diffuse, wo, wi);
+            if (!has_glossy) return;
+        }
         glossy += kernel * photon.power * eval_lobe(bsdf, Lobe::Glossy, wo, wi);
     };
     if (state.has_receiver) {
@@ -235,6 +267,17 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
                         : state.is_first_receiver ? Layer::Caustics
                                                   : Layer::Diffuse;
     result.layers[static_cast<std::size_t>(layer)] += state.throughput * reflected;
+}
+
+void PathTracer::add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                              const Vec3f& wo, std::uint32_t view, PathResult& result) const {
+    const auto* face = std::get_if<TranslucentBsdf>(&bsdf);
+    if (!face || !translucent_) return;
+    if (view == kAllParts) result.is_touched |= translucent_->is_touched(point.part);
+    const Rgb exitance = translucent_->exitance(scene_, point, view);
+    const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
+    result.layers[static_cast<std::size_t>(layer)] +=
+        state.throughput * exitance * (fresnel_transmittance(wo.z(), face->eta) / kPif);
 }
 
 void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,

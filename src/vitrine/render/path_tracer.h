@@ -9,6 +9,7 @@
 #include "render/caustics.h"
 #include "render/render_scene.h"
 #include "render/sampler.h"
+#include "render/translucent_light.h"
 
 #include <array>
 
@@ -42,11 +43,18 @@ struct PathResult {
 class PathTracer {
   public:
     /// @param caustics may be null: the reference; kept by reference, as is the scene
-    PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options = {});
+    /// @param translucent null: translucent bodies show only their paint
+    PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options = {},
+               const TranslucentLight* translucent = nullptr);
 
     /// @param view kAllParts for the scene with its virtual parts, kRealParts for the one without
     PathResult trace(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
                      std::uint32_t view) const;
+
+    /// Irradiance / pi that enters a translucent body at `point` along one path. Photons that land
+    /// on it are left out: they are known one by one.
+    PathResult entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
+                        std::uint32_t view) const;
 
   private:
     struct State;
@@ -61,8 +69,12 @@ class PathTracer {
     void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                       const Frame& frame, const Vec3f& wo, std::uint32_t view,
                       PathResult& result) const;
+    void add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                      const Vec3f& wo, std::uint32_t view, PathResult& result) const;
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                        const PathSampler& sampler, std::uint32_t view, PathResult& result) const;
+    void finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
+                PathResult& result) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
     bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,
@@ -72,6 +84,7 @@ class PathTracer {
     const RenderScene& scene_;
     const CausticMaps* caustics_;
     PathOptions options_;
+    const TranslucentLight* translucent_;
 };
 
 }  // namespace vitrine

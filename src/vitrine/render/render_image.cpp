@@ -45,7 +45,11 @@ RenderedImage render_image(const RenderScene& scene, const Camera& camera,
                            const CausticMaps* caustics, const FinalOptions& options,
                            const Progress& progress) {
     RenderedImage image{ImageRgb(camera.width, camera.height), ImageF(camera.width, camera.height)};
-    const PathTracer tracer(scene, caustics, options.paths);
+    TranslucentLightOptions translucent_options;
+    translucent_options.seed = options.seed;
+    const TranslucentLight translucent =
+        light_translucent_bodies(scene, caustics, options.paths, translucent_options);
+    const PathTracer tracer(scene, caustics, options.paths, &translucent);
     const Vec3f origin = camera.centre_in_world().cast<float>();
     const int n = options.samples_per_pixel;
     constexpr int kBand = 16;  // rows between two progress reports

@@ -1,6 +1,5 @@
 #include "render/render_scene.h"
 
-#include "base/log.h"
 #include "base/parallel.h"
 
 #include <numeric>
@@ -92,13 +91,14 @@ void Media::leave(int part) {
 
 RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
     epsilon_ = static_cast<float>(ray_epsilon(scene_));
-    for (const Part& part : scene_.parts) {
-        if (std::holds_alternative<Translucent>(part.material)) {
-            log_warning("{}: translucent meshes are rendered as plain diffuse so far", part.name);
-        }
-    }
     accel_ = build_accel(scene_.parts);
     if (open_contact_gaps(scene_, accel_, epsilon_)) accel_ = build_accel(scene_.parts);
+    for (const Part& part : scene_.parts) {
+        const auto* translucent = std::get_if<Translucent>(&part.material);
+        const bool is_body = translucent && !part.mesh->empty();
+        bodies_.push_back(is_body ? std::make_shared<TranslucentBody>(part.mesh, *translucent)
+                                  : nullptr);
+    }
     lights_ = LightSampler(scene_.lights, scene_.ambient_radiance);
     const Box3 box = bounds(scene_);
     if (!box.is_empty()) {
@@ -115,6 +115,15 @@ RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
     for (std::size_t i = 0; i < order.size(); ++i) {
         medium_rank_[static_cast<std::size_t>(order[i])] = static_cast<int>(i);
     }
+}
+
+bool RenderScene::has_bodies() const {
+    return std::any_of(bodies_.begin(), bodies_.end(), [](const auto& body) { return body; });
+}
+
+bool RenderScene::has_virtual() const {
+    return std::any_of(scene_.parts.begin(), scene_.parts.end(),
+                       [](const Part& part) { return part.is_virtual; });
 }
 
 Rgb RenderScene::transmittance(const Media& media, float distance) const {
@@ -153,6 +162,7 @@ ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) co
 Rgb RenderScene::diffuse_albedo(int part, const Hit& hit) const {
     const Part& p = scene_.parts[static_cast<std::size_t>(part)];
     if (const auto* ward = std::get_if<Ward>(&p.material)) return ward->rho_d;
+    if (const TranslucentBody* translucent = body(part)) return translucent->albedo();
     const auto* diffuse = std::get_if<Diffuse>(&p.material);
     if (!diffuse) return Rgb::Zero();
     if (diffuse->albedo_texture && !p.mesh->uv.empty()) {
@@ -174,6 +184,11 @@ Bsdf RenderScene::bsdf(const ShadingPoint& point, const Hit& hit) const {
                         static_cast<float>(ward->sigma_y), ward->form == WardForm::Duer};
     }
     if (const auto* mirror = std::get_if<Mirror>(&m)) return MirrorBsdf{mirror->reflectance};
+    if (const TranslucentBody* translucent = body(point.part)) {
+        const auto& face = std::get<Translucent>(m);
+        return TranslucentBsdf{translucent->near_share(), static_cast<float>(face.eta),
+                               static_cast<float>(face.sigma)};
+    }
     return DiffuseBsdf{diffuse_albedo(point.part, hit)};
 }
 

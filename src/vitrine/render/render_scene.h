@@ -3,6 +3,7 @@
 
 #include "render/bsdf.h"
 #include "render/light_sampler.h"
+#include "render/translucent_body.h"
 #include "scene/scene.h"
 #include "trace/accel.h"
 
@@ -71,6 +72,12 @@ class RenderScene {
         const Dielectric* medium = dielectric(media.current());
         return medium ? static_cast<float>(medium->ior) : 1.0f;
     }
+    /// The translucent body that a part is; null for all other materials.
+    const TranslucentBody* body(int part) const {
+        return bodies_[static_cast<std::size_t>(part)].get();
+    }
+    bool has_bodies() const;
+    bool has_virtual() const;
     /// exp(-sigma_a distance) of the medium a path is in.
     Rgb transmittance(const Media& media, float distance) const;
 
@@ -79,6 +86,7 @@ class RenderScene {
     /// Scattering of an opaque or mirror part at a point; dielectrics need the media and are not
     /// answered here.
     Bsdf bsdf(const ShadingPoint& point, const Hit& hit) const;
+    /// rho_d, or the albedo of a translucent body's profile; zero for glass and mirrors.
     Rgb diffuse_albedo(int part, const Hit& hit) const;
 
     /// Start of a ray that leaves `point` towards `direction`, off the surface by epsilon.
@@ -98,6 +106,7 @@ class RenderScene {
     LightSampler lights_;
     Sphere bounding_sphere_;
     std::vector<int> medium_rank_;
+    std::vector<std::shared_ptr<const TranslucentBody>> bodies_;  // per part
     float epsilon_ = 1e-6f;
 };
 

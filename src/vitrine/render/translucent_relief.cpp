@@ -4,6 +4,7 @@
 #include "image/filter.h"
 #include "image/poisson.h"
 #include "render/kernel_table.h"
+#include "render/split_kernel.h"
 
 namespace vitrine {
 namespace {
@@ -15,45 +16,6 @@ struct Sources {
 
 /// Nearer than this many cells the kernel is capped on the lattice.
 constexpr double kCapCells = 1.5;
-
-/// R_d split at the distance rho into what a lattice can hold and what it cannot.
-struct SplitKernel {
-    RadialProfile far;  ///< R beyond rho; a Gaussian cap of equal value and slope below
-    Rgbd near_share = Rgbd::Zero();  ///< albedo of R - far
-    double near_sigma = 0;           ///< its Gaussian width
-};
-
-SplitKernel split_kernel(const RadialProfile& profile, double rho) {
-    SplitKernel split;
-    const double h = 0.05 * rho;
-    const Rgbd value = profile.at(rho);
-    const Rgbd slope =
-        (profile.at(rho + h).max(1e-300).log() - profile.at(rho - h).max(1e-300).log()) / (2 * h);
-    const auto cap = [&](double r) -> Rgbd {
-        return value * ((slope.min(0.0) / (2 * rho)) * (r * r - rho * rho)).exp();
-    };
-    constexpr int kSteps = 64;
-    double second_moment = 0, weight = 0;
-    for (int i = 0; i < kSteps; ++i) {
-        const double r0 = rho * i / kSteps, r1 = rho * (i + 1) / kSteps, r = 0.5 * (r0 + r1);
-        split.far.r.push_back(r0);
-        split.far.rd.push_back(cap(r0));
-        const Rgbd ring =
-            profile.cumulative(r1) - profile.cumulative(r0) - kPi * (r1 * r1 - r0 * r0) * cap(r);
-        split.near_share += ring;
-        second_moment += ring.max(0.0).sum() * r * r;
-        weight += ring.max(0.0).sum();
-    }
-    if (weight > 0) split.near_sigma = std::sqrt(0.5 * second_moment / weight);
-    split.far.r.push_back(rho);
-    split.far.rd.push_back(value);
-    for (std::size_t i = 0; i < profile.r.size(); ++i) {
-        if (profile.r[i] <= rho) continue;
-        split.far.r.push_back(profile.r[i]);
-        split.far.rd.push_back(profile.rd[i]);
-    }
-    return split;
-}
 
 Eigen::Array4f widen(const Rgb& v) { return {v[0], v[1], v[2], 0.0f}; }
 

@@ -1,15 +1,8 @@
 #include "render/translucent_samples.h"
 
 #include "base/parallel.h"
-#include "optics/fresnel.h"
 
 namespace vitrine {
-
-double fresnel_transmittance(double cos_outside, double eta) {
-    if (cos_outside <= 0) return 0;
-    if (eta == 1.0) return 1;
-    return 1 - fresnel_dielectric(std::min(cos_outside, 1.0), eta);
-}
 
 double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta) {
     const double cosine = normal.cast<double>().dot(direction);

@@ -2,6 +2,7 @@
 // light that enters it.
 #pragma once
 
+#include "optics/fresnel.h"
 #include "scene/relief.h"
 
 #include <vector>
@@ -25,9 +26,6 @@ constexpr float kMinAreaCos = 0.15f;
 /// About `per_side` samples on each side. The back mirrors the front about the silhouette plane
 /// (the assumption of the paper): position (x, y, -z), normal (nx, ny, -nz).
 ReliefSamples sample_relief(const Relief& relief, int per_side);
-
-/// Unpolarised Fresnel transmittance into a medium of index `eta`; 1 when eta = 1.
-double fresnel_transmittance(double cos_outside, double eta);
 
 /// What a distant light of unit irradiance sends through a surface of normal n.
 double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta);

@@ -50,6 +50,7 @@ struct Translucent {
     std::vector<double> r_m;      ///< radii of the table, increasing
     std::vector<Rgbd> rd_per_m2;  ///< R_d at those radii
     double eta = 1.3;
+    double sigma = 0.0;           ///< roughness of the interface's reflection; 0: none
     std::string file;             ///< the material.json it came from
     double scale_px_per_m = 0.0;  ///< used to convert the file's pixels
 };

@@ -66,6 +66,19 @@ Material read_ward(const JsonObject& object) {
     return ward;
 }
 
+Material read_translucent(const JsonObject& object, const fs::path& folder) {
+    const double scale = object.number_or("scale_px_per_m", 0.0);
+    if (object.has("scale_px_per_m")) require_range(object, "scale_px_per_m", scale, 1e-3, 1e9);
+    const fs::path file = resolve_inside(object, "file", folder);
+    Translucent translucent = read_translucent_file(file, scale);
+    translucent.file = object.text("file");
+    if (object.has("sigma")) {
+        translucent.sigma = object.number("sigma");
+        require_range(object, "sigma", translucent.sigma, 0.001, 1.0);
+    }
+    return translucent;
+}
+
 }  // namespace
 
 Rgb read_rgb(const JsonObject& object, const std::string& key) {
@@ -134,8 +147,7 @@ Material read_material(const JsonObject& object, const fs::path& folder) {
         }
         material = dielectric;
     } else {
-        const double scale = object.number_or("scale_px_per_m", 0.0);
-        material = read_translucent_file(resolve_inside(object, "file", folder), scale);
+        material = read_translucent(object, folder);
     }
     object.finish();
     return material;
@@ -229,6 +241,7 @@ Json to_json(const Material& material) {
     } else if (const auto* translucent = std::get_if<Translucent>(&material)) {
         json["file"] = translucent->file;
         json["scale_px_per_m"] = translucent->scale_px_per_m;
+        if (translucent->sigma > 0) json["sigma"] = translucent->sigma;
     }
     return json;
 }
@@ -280,8 +293,11 @@ Translucent read_translucent_file(const fs::path& path, double scale_px_per_m) {
     translucent.scale_px_per_m =
         scale_px_per_m > 0 ? scale_px_per_m : object.number_or("scale_px_per_m", 0.0);
     if (translucent.scale_px_per_m <= 0) {
-        object.fail("scale_px_per_m", "a number > 0", "none",
-                    "The material was lifted from a photo of unknown scale: give scale_px_per_m.");
+        object.fail(
+            "scale_px_per_m", "a number > 0", "none",
+            "Its photo's scale is unknown. Give \"scale_px_per_m\" beside the \"file\" that "
+            "names this material, or lift it again with --source-px-per-m or "
+            "--object-size-m.");
     }
     translucent.eta = object.number_or("eta", 1.3);
     require_range(object, "eta", translucent.eta, 1.0, 3.0);

@@ -21,14 +21,16 @@ Material map_material(const GltfMaterial& gltf) {
     return Diffuse{gltf.base_colour.min(1.0f).max(0.0f), nullptr, "", false};
 }
 
-Mesh closed_for_glass(const Mesh& mesh, const std::filesystem::path& file,
-                      std::vector<std::string>& notes) {
+/// Glass and translucent bodies have an inside.
+Mesh closed_body(const Mesh& mesh, const std::string& what, const std::filesystem::path& file,
+                 std::vector<std::string>& notes) {
     Mesh result = mesh;
     if (!find_defects(result).is_closed()) {
         result = welded(mesh, kWeldShare * bounds(mesh).size().norm());
         const MeshDefects defects = find_defects(result);
         if (!defects.is_closed()) {
-            throw InputError({file.string(), "a closed mesh for glass (each edge used twice)",
+            throw InputError({file.string(),
+                              "a closed mesh for " + what + " (each edge used twice)",
                               fmt::format("{} open and {} non-manifold edges",
                                           defects.boundary_edges, defects.non_manifold_edges),
                               "Close its holes in a modeller, or give it another material."});
@@ -81,8 +83,9 @@ std::vector<Part> make_virtual_parts(const std::vector<VirtualMesh>& meshes,
                             ? *virtual_mesh.own_material
                             : Material(Diffuse{Rgb::Constant(kMatteAlbedo), nullptr, "", false});
         Mesh mesh = transformed(virtual_mesh.mesh, world_from_mesh);
-        if (std::holds_alternative<Dielectric>(part.material)) {
-            mesh = closed_for_glass(mesh, file, notes);
+        const bool is_glass = std::holds_alternative<Dielectric>(part.material);
+        if (is_glass || std::holds_alternative<Translucent>(part.material)) {
+            mesh = closed_body(mesh, is_glass ? "glass" : "a translucent body", file, notes);
         }
         if (mesh.normals.empty()) mesh = with_creased_normals(welded(mesh, 1e-7), kCrease_deg);
         part.mesh = std::make_shared<Mesh>(std::move(mesh));
