@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "math/sampling.h"
+#include "optics/fresnel.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,52 +11,101 @@
 
 namespace vitrine {
 
-namespace {
-
-struct Photon {
-    Vec3f position = Vec3f::Zero();
-    Vec3f direction = Vec3f::Zero();
-    Rgb power = Rgb::Zero();  // per W/sr of the light; zero: lost
-};
-
-Photon shoot(const EstimationScene& scene, int object, const TrialLight& light, std::uint64_t index,
-             std::uint32_t opaque_mask, const TrialCaustic& options) {
-    Photon photon;
-    const Frame lamp(light.normal.cast<float>());
-    const Box3& box = scene.object_bounds(object);
-    const Vec3f target = box.centre().cast<float>();
-    const float radius = static_cast<float>(box.radius());
-
+std::optional<CausticBeam::Entry> CausticBeam::shoot(std::uint64_t index,
+                                                     std::uint32_t opaque_mask) const {
+    const Frame lamp(light_.normal.cast<float>());
+    const float radius = target_radius_;
     const Vec2f on_disc = sample_concentric_disc(
         {halton(index + 1, 2), halton(index + 1, 3)});  // bases 5 and 7, apart from the R2 pair
-    const Vec3f source = light.position_m.cast<float>() +
-                         static_cast<float>(light.radius_m) *
-                             (on_disc.x() * lamp.tangent + on_disc.y() * lamp.bitangent);
-    const Vec3f axis = target - source;
+    Entry entry;
+    entry.source = light_.position_m.cast<float>() +
+                   static_cast<float>(light_.radius_m) *
+                       (on_disc.x() * lamp.tangent + on_disc.y() * lamp.bitangent);
+    const Vec3f axis = target_ - entry.source;
     const float distance = axis.norm();
-    if (distance <= radius) return photon;  // light inside the object's sphere: no cone
+    if (distance <= radius) return std::nullopt;  // light inside the object's sphere: no cone
     const float cos_max = std::sqrt(1.0f - (radius / distance) * (radius / distance));
     const Vec3f direction =
         Frame(axis / distance).to_world(sample_uniform_cone(r2_point(index), cos_max));
     const float cos_l = lamp.normal.dot(direction);
-    if (cos_l <= 0.0f) return photon;
-    const RefractedPath path =
-        options.is_shell
-            ? pass_through_shell(scene, object, source, direction, static_cast<float>(options.ior),
-                                 static_cast<float>(options.wall_m))
-            : refract_through(scene, object, source, direction, static_cast<float>(options.ior));
-    if (!path.is_valid) return photon;
-    if (scene.accel().is_occluded({source, path.entry - source, 0.0f, 0.999f, opaque_mask}))
-        return photon;
-    const Hit hit = scan_behind(scene, path, scene.offset_m());
-    if (!hit.is_hit() || hit.normal.dot(path.exit_direction) >= 0.0f) return photon;
+    if (cos_l <= 0.0f) return std::nullopt;
+    entry.entry = enter_object(scene_, object_, entry.source, direction);
+    if (options_.is_shell ? !entry.entry.is_hit : !entry.entry.is_valid) return std::nullopt;
+    if (scene_.accel().is_occluded(
+            {entry.source, entry.entry.point - entry.source, 0.0f, 0.999f, opaque_mask}))
+        return std::nullopt;
     const double solid_angle = cone_solid_angle(std::asin(radius / distance));
-    photon.position = hit_point(scene.mesh(hit.part), hit);
-    photon.direction = path.exit_direction;
-    photon.power = (-options.sigma_a_per_m * path.length_m).exp() * path.transmittance * cos_l *
-                   static_cast<float>(solid_angle / options.photon_count);
-    return photon;
+    entry.power = cos_l * static_cast<float>(solid_angle / options_.photon_count);
+    if (!options_.is_shell) {
+        entry.mirrored = reflect_at(entry.entry);
+        entry.mirrored.power *= entry.power;
+    }
+    return entry;
 }
+
+BeamArrival CausticBeam::reflect_at(const ObjectEntry& entry) const {
+    BeamArrival arrival;
+    const Vec3f direction = reflect(-entry.direction, entry.normal);
+    const Hit hit =
+        scene_.accel().closest({entry.point + scene_.offset_m() * entry.normal, direction, 0.0f,
+                                1e30f, kScanMask | object_mask(object_)});
+    if (!hit.is_hit() || scene_.object_of_part(hit.part) >= 0 || hit.normal.dot(direction) >= 0)
+        return arrival;
+    arrival.position = hit_point(scene_.mesh(hit.part), hit);
+    arrival.direction = direction;
+    arrival.normal = hit.normal;
+    arrival.power = Rgb::Ones();
+    return arrival;
+}
+
+CausticBeam::CausticBeam(const EstimationScene& scene, int object, const TrialLight& light,
+                         std::uint32_t opaque_mask, const CausticBeamOptions& options)
+    : scene_(scene), object_(object), light_(light), options_(options) {
+    target_ = scene.object_bounds(object).centre().cast<float>();
+    for (const Vec3f& v : scene.mesh(scene.part_of_object(object)).vertices)
+        target_radius_ = std::max(target_radius_, (v - target_).norm());
+    std::vector<std::optional<Entry>> shot(static_cast<std::size_t>(options.photon_count));
+    parallel_for(shot.size(), 1024, [&](std::size_t i) { shot[i] = shoot(i, opaque_mask); });
+    for (const std::optional<Entry>& entry : shot)
+        if (entry) entries_.push_back(*entry);
+}
+
+BeamArrival CausticBeam::arrive(const Entry& entry, float ior, const Rgb& sigma_a,
+                                int skipped_exits) const {
+    BeamArrival arrival;
+    const RefractedPath path =
+        options_.is_shell ? pass_through_shell(scene_, object_, entry.source, entry.entry.direction,
+                                               ior, static_cast<float>(options_.wall_m))
+                          : refract_from(scene_, object_, entry.entry, ior, skipped_exits);
+    if (!path.is_valid) return arrival;
+    const Hit hit = scan_behind(scene_, path, scene_.offset_m());
+    if (!hit.is_hit() || hit.normal.dot(path.exit_direction) >= 0.0f) return arrival;
+    arrival.position = hit_point(scene_.mesh(hit.part), hit);
+    arrival.direction = path.exit_direction;
+    arrival.normal = hit.normal;
+    arrival.power = (-sigma_a * path.length_m).exp() * path.transmittance * entry.power;
+    return arrival;
+}
+
+std::vector<BeamArrival> CausticBeam::arrivals(double ior, const Rgb& sigma_a_per_m) const {
+    const auto eta = static_cast<float>(ior);
+    const auto ways = static_cast<std::size_t>(options_.is_shell ? 1 : 1 + options_.max_exits);
+    std::vector<BeamArrival> arrivals(entries_.size() * ways);
+    parallel_for(entries_.size(), 1024, [&](std::size_t i) {
+        const Entry& entry = entries_[i];
+        BeamArrival* out = &arrivals[i * ways];
+        if (!options_.is_shell) {
+            *out = entry.mirrored;
+            out->power *= fresnel_dielectric(-entry.entry.normal.dot(entry.entry.direction), eta);
+            ++out;
+        }
+        const int exits = options_.is_shell ? 1 : options_.max_exits;
+        for (int way = 0; way < exits; ++way) *out++ = arrive(entry, eta, sigma_a_per_m, way);
+    });
+    return arrivals;
+}
+
+namespace {
 
 struct Cell {
     int x, y, z;
@@ -78,10 +128,12 @@ Cell cell_of(const Vec3f& p, float size) {
 std::vector<Rgb> caustic_irradiance(const EstimationScene& scene, int object,
                                     const TrialLight& light, std::span<const SurfacePoint> points,
                                     std::uint32_t opaque_mask, const TrialCaustic& options) {
-    std::vector<Photon> photons(static_cast<std::size_t>(options.photon_count));
-    parallel_for(photons.size(), 1024, [&](std::size_t i) {
-        photons[i] = shoot(scene, object, light, i, opaque_mask, options);
-    });
+    CausticBeamOptions beam;
+    beam.photon_count = options.photon_count;
+    beam.is_shell = options.is_shell;
+    beam.wall_m = options.wall_m;
+    const std::vector<BeamArrival> photons = CausticBeam(scene, object, light, opaque_mask, beam)
+                                                 .arrivals(options.ior, options.sigma_a_per_m);
 
     // Cells of one kernel radius, photons in index order within each: sums do not depend on
     // threads.

@@ -11,17 +11,30 @@ namespace {
 constexpr float kLeave = 2e-5f;  // metres off a smooth hull: well above float noise at one metre
 }
 
-RefractedPath refract_through(const EstimationScene& scene, int object, const Vec3f& origin,
-                              const Vec3f& direction, float ior, int skipped_exits) {
+ObjectEntry enter_object(const EstimationScene& scene, int object, const Vec3f& origin,
+                         const Vec3f& direction) {
+    ObjectEntry entry;
+    const Mesh& mesh = scene.mesh(scene.part_of_object(object));
+    const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, object_mask(object)});
+    if (!hit.is_hit()) return entry;
+    entry.is_hit = true;
+    entry.point = hit_point(mesh, hit);
+    entry.normal = shading_normal(mesh, hit);
+    entry.direction = direction;
+    entry.is_valid = hit.normal.dot(direction) < 0.0f && entry.normal.dot(direction) < 0.0f;
+    return entry;
+}
+
+RefractedPath refract_from(const EstimationScene& scene, int object, const ObjectEntry& entry,
+                           float ior, int skipped_exits) {
     RefractedPath path;
+    path.entry = entry.point;
+    path.entry_normal = entry.normal;
+    if (!entry.is_valid) return path;
     const Mesh& mesh = scene.mesh(scene.part_of_object(object));
     const std::uint32_t mask = object_mask(object);
-    Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, mask});
-    if (!hit.is_hit()) return path;
-    Vec3f normal = shading_normal(mesh, hit);
-    path.entry = hit_point(mesh, hit);
-    path.entry_normal = normal;
-    if (hit.normal.dot(direction) >= 0.0f || normal.dot(direction) >= 0.0f) return path;
+    Vec3f normal = entry.normal;
+    const Vec3f& direction = entry.direction;
 
     float cos_t = 0.0f;
     path.entry_reflectance = fresnel_dielectric(-normal.dot(direction), ior, cos_t);
@@ -29,7 +42,7 @@ RefractedPath refract_through(const EstimationScene& scene, int object, const Ve
     Vec3f inside = refract(-direction, normal, ior, cos_t).normalized();
     Vec3f at = path.entry;
     for (int bounce = 0; bounce <= kMaxInternalReflections; ++bounce) {
-        hit = scene.accel().closest({at, inside, kLeave, 1e30f, mask});
+        const Hit hit = scene.accel().closest({at, inside, kLeave, 1e30f, mask});
         if (!hit.is_hit() || hit.normal.dot(inside) <= 0.0f) return path;  // leak of a rough mesh
         normal = shading_normal(mesh, hit);
         const float cos_i = normal.dot(inside);
@@ -51,6 +64,12 @@ RefractedPath refract_through(const EstimationScene& scene, int object, const Ve
         inside = (inside - 2.0f * cos_i * normal).normalized();
     }
     return path;
+}
+
+RefractedPath refract_through(const EstimationScene& scene, int object, const Vec3f& origin,
+                              const Vec3f& direction, float ior, int skipped_exits) {
+    return refract_from(scene, object, enter_object(scene, object, origin, direction), ior,
+                        skipped_exits);
 }
 
 RefractedPath pass_through_shell(const EstimationScene& scene, int object, const Vec3f& origin,

@@ -21,6 +21,21 @@ struct RefractedPath {
 
 constexpr int kMaxInternalReflections = 6;
 
+/// Where a ray from outside meets an object: the same for every trial index.
+struct ObjectEntry {
+    bool is_hit = false;
+    bool is_valid = false;  ///< met from outside, by the facet and by the smooth normal
+    Vec3f point = Vec3f::Zero();
+    Vec3f normal = Vec3f::Zero();     ///< shading, outward
+    Vec3f direction = Vec3f::Zero();  ///< of travel, unit
+};
+/// Other parts are not looked at.
+ObjectEntry enter_object(const EstimationScene& scene, int object, const Vec3f& origin,
+                         const Vec3f& direction);
+/// What follows behind the entry, for one index; `skipped_exits` as in `refract_through`.
+RefractedPath refract_from(const EstimationScene& scene, int object, const ObjectEntry& entry,
+                           float ior, int skipped_exits = 0);
+
 /// Traces `direction` (unit) from `origin` outside of `object`; other parts are not looked at.
 /// @param skipped_exits 0: leaves at the first chance (the strongest way, over 90 % of the light);
 ///   1: is reflected there and leaves at the second (4 % at normal incidence, more at grazing)
