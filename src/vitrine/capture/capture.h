@@ -31,7 +31,7 @@ struct ReferenceAlbedo {
 struct Capture {
     std::string name;
     std::vector<RgbdFrame> frames;
-    double saturation_level = 1.0;  ///< linear value at which a channel clips (1e30: never)
+    double saturation_level = 1.0;  ///< linear; the frame that clips first, 1e30: never
     bool has_poses = false;
     std::optional<ReferenceAlbedo> reference_albedo;
     std::vector<std::string> warnings;  ///< one plain sentence each
@@ -42,11 +42,11 @@ inline bool is_saturated(const Rgb& linear, double saturation_level) {
     return (linear >= static_cast<float>(0.98 * saturation_level)).any();
 }
 
-/// Reads a TUM RGB-D folder (interfaces.md 2): rgb.txt, depth.txt, associations.txt,
-/// groundtruth.txt, camera_intrinsic.json, capture.json.
-///
-/// Frames pair by time stamp (20 ms). Up to max(1, 5 %) damaged frames are dropped with a warning.
-/// Lens distortion is taken out. Costs about 15 ms per 640x360 frame.
+/// Reads a folder in one of the layouts of `capture_readers()` (read_capture.h), found by what it
+/// holds: TUM RGB-D, nerfstudio, Polycam raw, COLMAP, Redwood/Open3D. capture.json counts in all.
+/// Up to max(1, 5 %) damaged frames are dropped with a warning. Lens distortion is taken out, depth
+/// of a camera of its own is registered to the colour picture. Recordings that would fill the
+/// memory are thinned out. Costs about 15 ms per 640x360 frame.
 /// @throws InputError when the folder cannot be used; the message says what, where and what to do.
 Capture read_capture(const std::filesystem::path& folder, const Progress& progress = {});
 

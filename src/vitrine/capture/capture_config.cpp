@@ -11,11 +11,59 @@ Vec2 LensDistortion::distort(const Vec2& ideal) const {
             y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y};
 }
 
+Vec2 LensDistortion::undistort(const Vec2& bent) const {
+    Vec2 ideal = bent;
+    if (is_none()) return ideal;
+    for (int round = 0; round < 40; ++round) {
+        const Vec2 error = distort(ideal) - bent;
+        ideal -= error;
+        if (error.squaredNorm() < 1e-20) break;
+    }
+    return ideal;
+}
+
+namespace {
+
+constexpr long long kMaxSide_px = 65536;
+
+int side_of(const JsonObject& object, const std::string& key) {
+    const long long value = object.integer(key);
+    if (value < 1 || value > kMaxSide_px) {
+        object.fail(key, fmt::format("a size of 1 to {} pixels", kMaxSide_px),
+                    fmt::format("{}", value));
+    }
+    return static_cast<int>(value);
+}
+
+Rigid3 read_rigid(const JsonObject& object, const std::string& key) {
+    const std::vector<double> m = object.numbers(key, 16);
+    Mat3 rotation;
+    for (int r = 0; r < 3; ++r) {
+        for (int c = 0; c < 3; ++c) rotation(r, c) = m[static_cast<std::size_t>(4 * r + c)];
+    }
+    if (!is_rotation(rotation, 1e-3) || m[12] != 0 || m[13] != 0 || m[14] != 0 || m[15] != 1) {
+        object.fail(key, "a rotation and a translation (4 x 4, row-major, metres)",
+                    "scale, shear, mirroring or another last row");
+    }
+    return Rigid3::from_quaternion(Eigen::Quaterniond(rotation), Vec3(m[3], m[7], m[11]));
+}
+
+}  // namespace
+
 CaptureConfig read_capture_config(const std::filesystem::path& path) {
     CaptureConfig config;
     const JsonObject object = read_json_file(path);
-    config.depth_scale = object.number_or("depth_scale", config.depth_scale);
-    if (!(config.depth_scale > 0)) object.fail("depth_scale", "a number > 0", "none");
+    if (object.has("depth_scale")) {
+        config.depth_scale = object.number("depth_scale");
+        if (!(*config.depth_scale > 0)) object.fail("depth_scale", "a number > 0", "none");
+    }
+    if (object.has("metres_per_unit")) {
+        config.metres_per_unit = object.number("metres_per_unit");
+        if (!(*config.metres_per_unit > 0)) object.fail("metres_per_unit", "a number > 0", "none");
+    }
+    if (object.has("colour_from_depth")) {
+        config.colour_from_depth = read_rigid(object, "colour_from_depth");
+    }
     if (object.has("colour_space") &&
         object.choice("colour_space", {"srgb", "linear"}) == "linear") {
         config.colour_space = ColourSpace::Linear;
@@ -68,14 +116,13 @@ CameraIntrinsic read_camera_intrinsic(const std::filesystem::path& path) {
     const JsonObject object = read_json_file(path);
     CameraIntrinsic intrinsic;
     Camera& camera = intrinsic.camera;
-    camera.width = static_cast<int>(object.integer("width"));
-    camera.height = static_cast<int>(object.integer("height"));
+    camera.width = side_of(object, "width");
+    camera.height = side_of(object, "height");
     const std::vector<double> m = object.numbers("intrinsic_matrix", 9);  // column-major
     camera.fx = m[0];
     camera.fy = m[4];
     camera.cx = m[6];
     camera.cy = m[7];
-    if (camera.width < 1 || camera.height < 1) object.fail("width", "a size > 0", "none");
     if (!(camera.fx > 0 && camera.fy > 0)) {
         object.fail("intrinsic_matrix", "focal lengths > 0",
                     fmt::format("fx = {}, fy = {}", camera.fx, camera.fy),

@@ -3,89 +3,32 @@
 #include "base/file.h"
 #include "capture/capture_config.h"
 #include "capture/check.h"
+#include "capture/made_capture.h"
 #include "capture/trajectory.h"
 #include "image/colour.h"
 #include "image/image_io.h"
 
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 namespace vitrine {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kWidth = 96, kHeight = 64, kFrames = 8;
-constexpr double kFocal = 80;
-
-/// A textured floor z = 0 seen from cameras at several heights (from one height, a floor scaled
-/// with its depth is still a floor: no unit could be told). Written as a user's folder.
 class CaptureFolder : public testing::Test {
   protected:
-    fs::path folder_ =
-        fs::temp_directory_path() / ("vitrine_capture_" + std::to_string(::getpid()));
-
-    static Camera camera_of(int frame) {
-        const double angle = 0.25 * frame;
-        return {
-            "",
-            kWidth,
-            kHeight,
-            kFocal,
-            kFocal,
-            47.5,
-            31.5,
-            look_at(Vec3(0.6 * std::cos(angle), 0.6 * std::sin(angle), 0.45 + 0.07 * (frame % 3)),
-                    Vec3::Zero(), Vec3(0, 0, 1))
-                .inverse()};
-    }
+    ScratchFolder scratch_{"capture"};
+    const fs::path& folder_ = scratch_.path();
+    MadeCapture made_;
 
     void SetUp() override {
-        fs::create_directories(folder_);
-        std::string rgb, depth;
-        std::vector<StampedPose> poses;
-        for (int i = 0; i < kFrames; ++i) {
-            const Camera camera = camera_of(i);
-            ImageRgb8 colour(kWidth, kHeight);
-            Image<std::uint16_t> codes(kWidth, kHeight);
-            for (int v = 0; v < kHeight; ++v) {
-                for (int u = 0; u < kWidth; ++u) {
-                    const Vec3 d = camera.ray_in_world(u, v), o = camera.centre_in_world();
-                    const Vec3 p = o - d * (o.z() / d.z());
-                    colour(u, v) = Rgb8::Constant(static_cast<std::uint8_t>(
-                        128 + 60 * std::sin(40 * p.x()) * std::cos(30 * p.y())));
-                    codes(u, v) = static_cast<std::uint16_t>(std::lround(5000 * camera.depth(p)));
-                }
-            }
-            const std::string name = fmt::format("{:06d}.png", i);
-            write_png(folder_ / "rgb" / name, colour);
-            write_png16(folder_ / "depth" / name, codes);
-            rgb += fmt::format("{:.4f} rgb/{}\n", 0.1 * i, name);
-            depth += fmt::format("{:.4f} depth/{}\n", 0.1 * i + 0.003, name);
-            poses.push_back({0.1 * i, camera.cam_from_world.inverse()});
-        }
-        write_text_file(folder_ / "rgb.txt", rgb);
-        write_text_file(folder_ / "depth.txt", "# comment\n" + depth);
-        write_trajectory(folder_ / "groundtruth.txt", poses);
-        write_text_file(folder_ / "camera_intrinsic.json",
-                        R"({"width": 96, "height": 64,
-                            "intrinsic_matrix": [80, 0, 0, 0, 80, 0, 47.5, 31.5, 1]})");
+        made_.write_tum(folder_);
         write_config("\"depth_scale\": 5000, \"linear_scale\": 1.25");
     }
-    void TearDown() override { fs::remove_all(folder_); }
-
     void write_config(const std::string& keys) {
         write_text_file(folder_ / "capture.json", "{" + keys + "}");
     }
-    std::string error() {
-        try {
-            read_capture(folder_);
-        } catch (const InputError& e) {
-            return e.what();
-        }
-        return "no error";
-    }
+    std::string error() const { return capture_error(folder_); }
 };
 
 TEST_F(CaptureFolder, ReadsLinearLightMetresAndPoses) {
@@ -96,9 +39,10 @@ TEST_F(CaptureFolder, ReadsLinearLightMetresAndPoses) {
     const RasterImage png = read_png(folder_ / "rgb/000002.png");
     EXPECT_FLOAT_EQ(capture.frames[2].colour(5, 0)[0],
                     srgb_to_linear(png.codes[15] / 255.0f) * 1.25f);
-    EXPECT_LT((capture.frames[5].camera.centre_in_world() - camera_of(5).centre_in_world()).norm(),
-              1e-6);
-    const Vec3 p = capture.frames[4].camera.unproject(20, 30, capture.frames[4].depth_m(20, 30));
+    EXPECT_LT(
+        (capture.frames[5].camera.centre_in_world() - made_.camera(5).centre_in_world()).norm(),
+        1e-6);
+    const Vec3 p = capture.frames[4].camera.unproject(20, 55, capture.frames[4].depth_m(20, 55));
     EXPECT_NEAR(p.z(), 0.0, 2e-4);
     EXPECT_GT(depth_consistency(capture, 1.0), 0.9);
     for (const Verdict& verdict : check_capture(capture)) {
@@ -152,9 +96,9 @@ TEST_F(CaptureFolder, PosesThatCannotBe) {
 }
 
 TEST_F(CaptureFolder, EmptyDepthIsRefused) {
-    for (int i = 0; i < kFrames; ++i) {
+    for (int i = 0; i < made_.frames; ++i) {
         write_png16(folder_ / "depth" / fmt::format("{:06d}.png", i),
-                    Image<std::uint16_t>(kWidth, kHeight, 0));
+                    Image<std::uint16_t>(made_.width, made_.height, 0));
     }
     EXPECT_NE(error().find("zero everywhere"), std::string::npos) << error();
 }

@@ -1,5 +1,7 @@
 #include "capture/check.h"
 
+#include "capture/exposure_gains.h"
+#include "capture/read_capture.h"
 #include "image/colour.h"
 #include "math/statistics.h"
 
@@ -9,7 +11,8 @@
 namespace vitrine {
 namespace {
 
-constexpr int kPixelStep = 7;  // every seventh pixel each way: 4,700 of a 640x360 frame
+constexpr std::size_t kMinViews = 8;  // fewer outlines leave a hull with corners
+constexpr int kPixelStep = 7;         // every seventh pixel each way: 4,700 of a 640x360 frame
 
 double valid_share(const ImageF& depth) {
     std::size_t valid = 0;
@@ -60,6 +63,13 @@ double saturated_share(const RgbdFrame& frame, double level) {
     return static_cast<double>(count) / static_cast<double>(frame.colour.size());
 }
 
+/// Intrinsics written for pictures of another size give themselves away.
+bool are_of_another_size(const Camera& camera) {
+    const double x = (camera.cx + 0.5) / camera.width, y = (camera.cy + 0.5) / camera.height;
+    const double focal = camera.fx / camera.width;  // 0.35: 110 degrees, 4: 14 degrees
+    return x < 0.3 || x > 0.7 || y < 0.3 || y > 0.7 || focal < 0.35 || focal > 4;
+}
+
 double largest_baseline(const Capture& capture) {
     double largest = 0;
     for (const RgbdFrame& a : capture.frames) {
@@ -76,8 +86,10 @@ double largest_baseline(const Capture& capture) {
 double depth_consistency(const Capture& capture, double factor) {
     if (!capture.has_poses || capture.frames.size() < 2) return 0.0;
     std::size_t agree = 0, seen = 0;
-    for (std::size_t i = 0; i + 1 < capture.frames.size(); ++i) {
-        const RgbdFrame &a = capture.frames[i], &b = capture.frames[i + 1];
+    // Frames of a video differ too little from the next one to contradict it.
+    const std::size_t step = std::max<std::size_t>(1, capture.frames.size() / 12);
+    for (std::size_t i = 0; i + step < capture.frames.size(); ++i) {
+        const RgbdFrame &a = capture.frames[i], &b = capture.frames[i + step];
         for (int y = 0; y < a.depth_m.height(); y += kPixelStep) {
             for (int x = 0; x < a.depth_m.width(); x += kPixelStep) {
                 const double depth = a.depth_m(x, y) * factor;
@@ -154,64 +166,122 @@ void require_usable(const Capture& capture, const std::filesystem::path& folder,
     }
 }
 
-std::vector<Verdict> check_capture(const Capture& capture) {
-    std::vector<Verdict> verdicts;
-    const auto say = [&](Severity severity, std::string sentence) {
-        verdicts.push_back({severity, std::move(sentence)});
-    };
-    for (const std::string& warning : capture.warnings) say(Severity::Note, warning);
+namespace {
+
+using Verdicts = std::vector<Verdict>;
+
+void check_views(const Capture& capture, Verdicts& verdicts) {
     const std::size_t count = capture.frames.size();
     const Camera& camera = capture.frames.front().camera;
-    say(count >= 8 ? Severity::Good : Severity::Problem,
-        fmt::format("{} frames of {} x {} pixels{}", count, camera.width, camera.height,
-                    count >= 8 ? ""
-                               : ": too few for silhouettes of glass, 12 or more around the "
-                                 "scene would do"));
-    if (capture.has_poses) {
-        const double baseline = largest_baseline(capture), depth = median_depth(capture);
-        const bool has_parallax = baseline > 0.2 * depth;
-        say(has_parallax ? Severity::Good : Severity::Problem,
-            fmt::format("poses given, cameras up to {:.2f} m apart at {:.2f} m distance{}",
-                        baseline, depth,
-                        has_parallax ? "" : ": too little parallax, walk around the scene"));
-        const double agreement = depth_consistency(capture, 1.0);
-        say(agreement > 0.5 ? Severity::Good : Severity::Problem,
-            fmt::format("{:.0f} % of the depth agrees between neighbouring views",
-                        100 * agreement));
-    } else {
-        say(Severity::Note, "no poses: the camera will be tracked");
+    const bool has_enough = count >= kMinViews;
+    verdicts.push_back(
+        {has_enough ? Severity::Good : Severity::Problem,
+         fmt::format("{} frames of {} x {} pixels{}", count, camera.width, camera.height,
+                     has_enough ? ""
+                                : ": too few for silhouettes of glass, 12 or more around the "
+                                  "scene would do")});
+    if (are_of_another_size(camera)) {
+        verdicts.push_back(
+            {Severity::Problem,
+             fmt::format("fx = {:g}, cx = {:g}, cy = {:g} are unusual for {} x {} pixels: are the "
+                         "intrinsics of pictures of another size? fx, fy, cx and cy scale with it",
+                         camera.fx, camera.cx, camera.cy, camera.width, camera.height)});
     }
-    std::vector<double> shares, sharp, levels, saturated;
+}
+
+void check_poses(const Capture& capture, Verdicts& verdicts) {
+    if (!capture.has_poses) {
+        verdicts.push_back({Severity::Note, "no poses: the camera will be tracked"});
+        return;
+    }
+    const double baseline = largest_baseline(capture), depth = median_depth(capture);
+    const bool has_parallax = baseline > 0.2 * depth;
+    verdicts.push_back(
+        {has_parallax ? Severity::Good : Severity::Problem,
+         fmt::format("poses given, cameras up to {:.2f} m apart at {:.2f} m distance{}", baseline,
+                     depth, has_parallax ? "" : ": too little parallax, walk around the scene")});
+    const double agreement = depth_consistency(capture, 1.0);
+    const bool agrees = agreement > 0.5;
+    verdicts.push_back(
+        {agrees ? Severity::Good : Severity::Problem,
+         fmt::format("{:.0f} % of the depth agrees between views{}", 100 * agreement,
+                     agrees ? ""
+                            : ": poses, intrinsics, depth_scale or the pairing of depth and "
+                              "colour are wrong")});
+}
+
+void check_depth(const Capture& capture, Verdicts& verdicts) {
+    std::vector<double> shares;
+    for (const RgbdFrame& frame : capture.frames) shares.push_back(valid_share(frame.depth_m));
+    const double typical = median(shares);
+    verdicts.push_back(
+        {typical > 0.3 ? Severity::Good : Severity::Problem,
+         fmt::format("{:.0f} % of the depth pixels are valid{}", 100 * typical,
+                     typical > 0.3 ? "" : ": too far, too near, too dark or in the sun")});
+}
+
+void check_saturation(const Capture& capture, Verdicts& verdicts) {
+    double worst = 0;
     for (const RgbdFrame& frame : capture.frames) {
-        shares.push_back(valid_share(frame.depth_m));
-        sharp.push_back(sharpness(frame.colour));
-        levels.push_back(mean_level(frame.colour));
-        saturated.push_back(saturated_share(frame, capture.saturation_level));
+        worst = std::max(worst, saturated_share(frame, capture.saturation_level));
     }
-    say(median(shares) > 0.3 ? Severity::Good : Severity::Problem,
-        fmt::format("{:.0f} % of the depth pixels are valid", 100 * median(shares)));
-    const double worst = *std::max_element(saturated.begin(), saturated.end());
-    say(worst < 0.05 ? Severity::Good : Severity::Problem,
-        fmt::format("at most {:.1f} % of a picture is saturated{}", 100 * worst,
-                    worst < 0.05 ? "" : ": expose shorter, highlights carry the light"));
-    const double typical_sharpness = median(sharp), typical_level = median(levels);
-    for (std::size_t i = 0; i < count; ++i) {
-        const std::string& id = capture.frames[i].id;
-        if (sharp[i] < 0.25 * typical_sharpness) {
-            say(Severity::Note, fmt::format("frame {} looks blurred (motion?)", id));
-        }
-        const double ratio = levels[i] / std::max(1e-12, typical_level);
-        if (ratio > 1.6 || ratio < 1 / 1.6) {
-            say(Severity::Note,
-                fmt::format(
-                    "frame {} is {:.1f}x as bright as the others: lock the exposure or give "
-                    "\"exposure\" in capture.json",
-                    id, ratio));
-        }
+    verdicts.push_back(
+        {worst < 0.05 ? Severity::Good : Severity::Problem,
+         fmt::format("at most {:.1f} % of a picture is saturated{}", 100 * worst,
+                     worst < 0.05 ? "" : ": expose shorter, highlights carry the light")});
+}
+
+void check_blur(const Capture& capture, Verdicts& verdicts) {
+    std::vector<double> sharp;
+    for (const RgbdFrame& frame : capture.frames) sharp.push_back(sharpness(frame.colour));
+    const double typical = median(sharp);
+    for (std::size_t i = 0; i < sharp.size(); ++i) {
+        if (sharp[i] >= 0.25 * typical) continue;
+        verdicts.push_back({Severity::Note, fmt::format("frame {} looks blurred (motion?): leave "
+                                                        "it out",
+                                                        capture.frames[i].id)});
     }
-    say(capture.reference_albedo ? Severity::Good : Severity::Note,
-        capture.reference_albedo ? "a reference albedo fixes the scale of the light"
-                                 : "no reference albedo: a mean albedo of 0.5 will be assumed");
+}
+
+/// With poses, by the same points in several views; without, by the whole pictures.
+void check_exposure(const Capture& capture, Verdicts& verdicts) {
+    std::vector<double> ratio;
+    double limit = 1.1;  // sees the same surfaces: shading is not in it
+    if (capture.has_poses) {
+        ratio = estimate_exposure_gains(capture, cameras_of(capture)).gain;
+    } else {
+        limit = 1.6;  // other things are in the picture
+        for (const RgbdFrame& frame : capture.frames) ratio.push_back(mean_level(frame.colour));
+        const double typical = std::max(1e-12, median(ratio));
+        for (double& r : ratio) r /= typical;
+    }
+    for (std::size_t i = 0; i < ratio.size(); ++i) {
+        if (ratio[i] < limit && ratio[i] > 1 / limit) continue;
+        verdicts.push_back(
+            {Severity::Note,
+             fmt::format("frame {} is {:.2f}x as bright as the others: lock the exposure, or give "
+                         "\"exposure\" in capture.json",
+                         capture.frames[i].id, ratio[i])});
+    }
+}
+
+}  // namespace
+
+std::vector<Verdict> check_capture(const Capture& capture) {
+    Verdicts verdicts;
+    for (const std::string& warning : capture.warnings) {
+        verdicts.push_back({Severity::Note, warning});
+    }
+    check_views(capture, verdicts);
+    check_poses(capture, verdicts);
+    check_depth(capture, verdicts);
+    check_saturation(capture, verdicts);
+    check_blur(capture, verdicts);
+    check_exposure(capture, verdicts);
+    verdicts.push_back({capture.reference_albedo ? Severity::Good : Severity::Note,
+                        capture.reference_albedo
+                            ? "a reference albedo fixes the scale of the light"
+                            : "no reference albedo: a mean albedo of 0.5 will be assumed"});
     return verdicts;
 }
 

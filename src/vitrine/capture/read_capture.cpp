@@ -1,10 +1,12 @@
-#include "base/text.h"
-#include "capture/capture.h"
-#include "capture/capture_config.h"
+#include "capture/read_capture.h"
+
+#include "base/log.h"
+#include "capture/capture_listing.h"
 #include "capture/check.h"
-#include "capture/trajectory.h"
+#include "capture/register_depth.h"
 #include "image/colour.h"
 #include "image/image_io.h"
+#include "math/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,68 +15,36 @@ namespace vitrine {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kPairingTolerance_s = 0.02;  // interfaces.md 8
-constexpr double kMinPairedShare = 0.8;
 constexpr double kMaxDamagedShare = 0.05;
+constexpr std::size_t kMinScalePoints = 30;
+constexpr double kMaxScaleSpread = 0.1;  // of the ratios of depth to sparse points, robust
 
-struct FramePair {
-    double timestamp_s;
-    std::string colour_file, depth_file;
+struct ColourPicture {
+    ImageRgb linear;
+    bool is_hdr = false;
+    std::size_t not_finite = 0;
 };
 
-std::vector<double> stamps_of(const std::vector<StampedFile>& list) {
-    std::vector<double> stamps;
-    for (const StampedFile& item : list) stamps.push_back(item.timestamp_s);
-    return stamps;
-}
-
-std::vector<FramePair> pair_frames(const fs::path& folder, std::vector<std::string>& warnings) {
-    const std::vector<StampedFile> colour = read_file_list(folder / "rgb.txt");
-    const std::vector<StampedFile> depth = read_file_list(folder / "depth.txt");
-    if (colour.empty()) {
-        throw InputError({(folder / "rgb.txt").string(), "at least one frame", "none", ""});
-    }
-    const std::vector<int> match =
-        associate(stamps_of(colour), stamps_of(depth), kPairingTolerance_s);
-    std::vector<FramePair> pairs;
-    for (std::size_t i = 0; i < colour.size(); ++i) {
-        if (match[i] < 0) continue;
-        pairs.push_back({colour[i].timestamp_s, colour[i].file,
-                         depth[static_cast<std::size_t>(match[i])].file});
-    }
-    const std::size_t unpaired = colour.size() - pairs.size();
-    if (static_cast<double>(pairs.size()) < kMinPairedShare * static_cast<double>(colour.size())) {
-        throw InputError({(folder / "rgb.txt").string(),
-                          "a depth picture within 20 ms for at least 80 % of the colour pictures",
-                          fmt::format("{} of {}", pairs.size(), colour.size()),
-                          "Are rgb.txt and depth.txt of the same recording and clock?"});
-    }
-    if (unpaired > 0) {
-        warnings.push_back(
-            fmt::format("{} of {} colour pictures have no depth within 20 ms and are "
-                        "left out",
-                        unpaired, colour.size()));
-    }
-    return pairs;
-}
-
-ImageRgb read_colour(const fs::path& path, const CaptureConfig& config, double exposure,
-                     bool& is_hdr) {
-    is_hdr = path.extension() == ".exr";
-    ImageRgb image = is_hdr ? read_exr_rgb(path) : read_encoded_rgb(path);
+ColourPicture read_colour(const fs::path& path, const CaptureConfig& config, double exposure) {
+    ColourPicture picture;
+    picture.is_hdr = path.extension() == ".exr";
+    picture.linear = picture.is_hdr ? read_exr_rgb(path) : read_encoded_rgb(path);
     const auto black = static_cast<float>(config.black_level);
     const auto gain = static_cast<float>(config.linear_scale / exposure);
-    for (Rgb& pixel : image) {
-        if (!is_hdr) {
+    for (Rgb& pixel : picture.linear) {
+        if (!picture.is_hdr) {
             pixel = ((pixel - black) / (1.0f - black)).max(0.0f);
             if (config.colour_space == ColourSpace::Srgb) {
                 for (int c = 0; c < 3; ++c) pixel[c] = srgb_to_linear(pixel[c]);
             }
         }
         pixel *= gain;
-        if (!pixel.allFinite()) pixel = Rgb::Zero();
+        if (!pixel.allFinite()) {
+            pixel = Rgb::Zero();
+            ++picture.not_finite;
+        }
     }
-    return image;
+    return picture;
 }
 
 ImageF read_depth(const fs::path& path, double depth_scale) {
@@ -86,116 +56,237 @@ ImageF read_depth(const fs::path& path, double depth_scale) {
     return depth;
 }
 
-/// Resamples to the ideal pinhole: colour bilinear, depth nearest (no mixing over edges).
-void remove_distortion(RgbdFrame& frame, const CameraIntrinsic& intrinsic) {
-    const Camera& camera = intrinsic.camera;
-    ImageRgb colour(camera.width, camera.height);
-    ImageF depth(camera.width, camera.height, 0.0f);
-    for (int v = 0; v < camera.height; ++v) {
-        for (int u = 0; u < camera.width; ++u) {
-            const Vec2 ideal((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
-            const Vec2 bent = intrinsic.distortion.distort(ideal);
-            const double x = bent.x() * camera.fx + camera.cx, y = bent.y() * camera.fy + camera.cy;
-            colour(u, v) = bilinear(frame.colour, x, y);
-            const int xi = static_cast<int>(std::lround(x)), yi = static_cast<int>(std::lround(y));
-            if (frame.depth_m.contains(xi, yi)) depth(u, v) = frame.depth_m(xi, yi);
-        }
-    }
-    frame.colour = std::move(colour);
-    frame.depth_m = std::move(depth);
+/// Where a pixel of the ideal pinhole lies in the picture.
+Vec2 bent_pixel(const CameraIntrinsic& intrinsic, int u, int v) {
+    const Camera& c = intrinsic.camera;
+    const Vec2 bent = intrinsic.distortion.distort({(u - c.cx) / c.fx, (v - c.cy) / c.fy});
+    return {bent.x() * c.fx + c.cx, bent.y() * c.fy + c.cy};
 }
 
-void check_size(const fs::path& file, int width, int height, const Camera& camera) {
+ImageRgb undistorted(const ImageRgb& colour, const CameraIntrinsic& intrinsic) {
+    ImageRgb ideal(colour.width(), colour.height());
+    for (int v = 0; v < colour.height(); ++v) {
+        for (int u = 0; u < colour.width(); ++u) {
+            const Vec2 at = bent_pixel(intrinsic, u, v);
+            ideal(u, v) = bilinear(colour, at.x(), at.y());
+        }
+    }
+    return ideal;
+}
+
+/// Nearest reading: no mixing over edges.
+ImageF undistorted(const ImageF& depth, const CameraIntrinsic& intrinsic) {
+    ImageF ideal(depth.width(), depth.height(), 0.0f);
+    for (int v = 0; v < depth.height(); ++v) {
+        for (int u = 0; u < depth.width(); ++u) {
+            const Vec2 at = bent_pixel(intrinsic, u, v);
+            const int x = static_cast<int>(std::lround(at.x()));
+            const int y = static_cast<int>(std::lround(at.y()));
+            if (depth.contains(x, y)) ideal(u, v) = depth(x, y);
+        }
+    }
+    return ideal;
+}
+
+void check_size(const fs::path& file, int width, int height, const Camera& camera,
+                const std::string& described_by, const std::string& hint) {
     if (width == camera.width && height == camera.height) return;
     throw InputError(
         {file.string(),
-         fmt::format("{} x {} pixels as camera_intrinsic.json says", camera.width, camera.height),
-         fmt::format("{} x {}", width, height),
-         "Colour and depth must be registered to one camera."});
+         fmt::format("{} x {} pixels as {}", camera.width, camera.height, described_by),
+         fmt::format("{} x {}", width, height), hint});
 }
 
-void set_poses(Capture& capture, const fs::path& folder, const CaptureConfig& config) {
-    const fs::path file = folder / "groundtruth.txt";
-    const bool wants_poses =
-        config.poses.value_or(fs::exists(file) ? PoseSource::Trajectory : PoseSource::None) ==
-        PoseSource::Trajectory;
-    if (!wants_poses) return;
-    const std::vector<StampedPose> poses = read_trajectory(file);
-    std::vector<double> pose_stamps, stamps;
-    for (const StampedPose& pose : poses) pose_stamps.push_back(pose.timestamp_s);
-    for (const RgbdFrame& frame : capture.frames) stamps.push_back(frame.timestamp_s);
-    const std::vector<int> match = associate(stamps, pose_stamps, kPairingTolerance_s);
-    std::vector<RgbdFrame> posed;
-    for (std::size_t i = 0; i < capture.frames.size(); ++i) {
-        if (match[i] < 0) continue;
-        RgbdFrame& frame = capture.frames[i];
-        frame.camera.cam_from_world =
-            poses[static_cast<std::size_t>(match[i])].world_from_camera.inverse();
-        posed.push_back(std::move(frame));
+/// The intrinsics of a picture of the same camera with another number of pixels.
+std::optional<CameraIntrinsic> scaled_intrinsic(const CameraIntrinsic& intrinsic, int width,
+                                                int height) {
+    const double across = double(width) / intrinsic.camera.width;
+    const double down = double(height) / intrinsic.camera.height;
+    if (std::abs(across / down - 1) > 0.02) return std::nullopt;
+    CameraIntrinsic scaled = intrinsic;
+    Camera& c = scaled.camera;
+    c.width = width;
+    c.height = height;
+    c.fx *= across;
+    c.fy *= down;
+    c.cx = (c.cx + 0.5) * across - 0.5;  // corners coincide, not centres of corner pixels
+    c.cy = (c.cy + 0.5) * down - 0.5;
+    return scaled;
+}
+
+/// Depth in the ideal pixels of the colour camera, whatever camera took it.
+ImageF bring_to_colour(const ImageF& depth, const ListedFrame& listed,
+                       const CaptureListing& listing) {
+    const Camera& colour = listed.intrinsic.camera;
+    if (listing.depth_camera) {
+        check_size(listed.depth_file, depth.width(), depth.height(),
+                   listing.depth_camera->intrinsic.camera, "depth_camera_intrinsic.json says", "");
+        return register_depth(depth, *listing.depth_camera, colour);
     }
-    if (static_cast<double>(posed.size()) < kMinPairedShare * static_cast<double>(stamps.size())) {
-        throw InputError({file.string(), "a pose within 20 ms for at least 80 % of the frames",
-                          fmt::format("{} of {}", posed.size(), stamps.size()),
-                          "Set \"poses\": \"none\" in capture.json to track the camera instead."});
+    if (depth.width() == colour.width && depth.height() == colour.height) {
+        return listed.intrinsic.distortion.is_none() ? depth : undistorted(depth, listed.intrinsic);
     }
-    if (posed.size() < stamps.size()) {
+    if (listing.allows_scaled_depth) {
+        if (const auto own = scaled_intrinsic(listed.intrinsic, depth.width(), depth.height())) {
+            return register_depth(depth, {*own, Rigid3()}, colour);
+        }
+    }
+    check_size(listed.depth_file, depth.width(), depth.height(), colour,
+               "the camera's intrinsics say",
+               "Colour and depth must be registered to one camera, or depth needs "
+               "depth_camera_intrinsic.json and \"colour_from_depth\" in capture.json.");
+    return {};
+}
+
+std::string size_hint(const Camera& camera, int width, int height) {
+    const double across = double(width) / camera.width, down = double(height) / camera.height;
+    if (std::abs(across / down - 1) > 0.01) return "Are they of this camera?";
+    return fmt::format(
+        "The intrinsics are of pictures of another size: multiply fx, fy, cx and cy by {:.4g}.",
+        across);
+}
+
+struct Pictures {
+    ColourPicture colour;
+    ImageF depth_m;
+};
+
+double exposure_of(const ListedFrame& listed, const CaptureConfig& config) {
+    const auto found = config.exposure.find(listed.id);
+    return found == config.exposure.end() ? 1.0 : found->second;
+}
+
+RgbdFrame make_frame(const ListedFrame& listed, const CaptureListing& listing, Pictures pictures) {
+    const Camera& camera = listed.intrinsic.camera;
+    ImageRgb& colour = pictures.colour.linear;
+    check_size(listed.colour_file, colour.width(), colour.height(), camera,
+               "the camera's intrinsics say", size_hint(camera, colour.width(), colour.height()));
+    RgbdFrame frame;
+    frame.id = listed.id;
+    frame.timestamp_s = listed.timestamp_s;
+    frame.exposure = exposure_of(listed, listing.config);
+    frame.colour = listed.intrinsic.distortion.is_none() ? std::move(colour)
+                                                         : undistorted(colour, listed.intrinsic);
+    frame.depth_m = bring_to_colour(pictures.depth_m, listed, listing);
+    frame.camera = camera;
+    frame.camera.id = frame.id;
+    if (listing.has_poses) frame.camera.cam_from_world = listed.cam_from_world;
+    return frame;
+}
+
+/// Keeps every k-th frame so that the pictures fit into memory.
+void thin_out(std::size_t max_bytes, CaptureListing& listing) {
+    std::size_t bytes = 0;
+    for (const ListedFrame& frame : listing.frames) {
+        const Camera& c = frame.intrinsic.camera;
+        bytes += static_cast<std::size_t>(c.width) * static_cast<std::size_t>(c.height) *
+                 (sizeof(Rgb) + sizeof(float));
+    }
+    const std::size_t step = (bytes + max_bytes - 1) / max_bytes;
+    if (step <= 1) return;
+    std::vector<ListedFrame> kept;
+    for (std::size_t i = 0; i < listing.frames.size(); i += step) {
+        kept.push_back(std::move(listing.frames[i]));
+    }
+    listing.warnings.push_back(
+        fmt::format("{} of {} frames are used (every {}th): all would need {:.1f} GB", kept.size(),
+                    listing.frames.size(), step, 1e-9 * static_cast<double>(bytes)));
+    listing.frames = std::move(kept);
+}
+
+/// The unit of poses that have one of their own: measured depth over the depth of sparse points.
+void set_scale(const CaptureListing& listing, const std::vector<std::size_t>& origin,
+               const fs::path& folder, Capture& capture) {
+    double scale = listing.metres_per_unit.value_or(0.0);
+    if (!listing.metres_per_unit) {
+        std::vector<double> ratios;
+        for (std::size_t i = 0; i < capture.frames.size(); ++i) {
+            const RgbdFrame& frame = capture.frames[i];
+            for (const Vec3& p : listing.frames[origin[i]].points) {
+                const Vec2 pixel = frame.camera.project_camera(p);
+                if (!frame.camera.sees(pixel)) continue;
+                const float z = frame.depth_m(static_cast<int>(std::lround(pixel.x())),
+                                              static_cast<int>(std::lround(pixel.y())));
+                if (z > 0) ratios.push_back(z / p.z());
+            }
+        }
+        scale = ratios.empty() ? 0.0 : median(ratios);
+        const double spread = scale > 0 ? robust_sd(ratios) / scale : 0.0;
+        if (ratios.size() < kMinScalePoints || spread > kMaxScaleSpread) {
+            throw InputError({folder.string(), "the unit of the poses",
+                              fmt::format("{} sparse points with depth that differ by {:.0f} %",
+                                          ratios.size(), 100 * spread),
+                              "Give \"metres_per_unit\" in capture.json."});
+        }
         capture.warnings.push_back(
-            fmt::format("{} frames have no pose and are left out", stamps.size() - posed.size()));
+            fmt::format("the model's unit is {:.4g} m: {} sparse points against the depth, which "
+                        "scatter by {:.1f} %",
+                        scale, ratios.size(), 100 * spread));
     }
-    capture.frames = std::move(posed);
-    capture.has_poses = true;
+    for (RgbdFrame& frame : capture.frames) frame.camera.cam_from_world.translation *= scale;
 }
 
 }  // namespace
 
+std::vector<fs::path> capture_files(const fs::path& folder) {
+    const CaptureListing listing = find_capture_reader(folder).list(folder);
+    std::vector<fs::path> files = listing.metadata;
+    for (const ListedFrame& frame : listing.frames) {
+        files.push_back(frame.colour_file);
+        files.push_back(frame.depth_file);
+    }
+    return files;
+}
+
 Capture read_capture(const fs::path& folder, const Progress& progress) {
-    if (!fs::is_directory(folder)) {
-        throw InputError({folder.string(), "a capture folder", "no such folder", ""});
-    }
-    if (!fs::exists(folder / "rgb.txt")) {
-        throw InputError({folder.string(), "rgb.txt, depth.txt and camera_intrinsic.json",
-                          fs::is_empty(folder) ? "an empty folder" : "no rgb.txt",
-                          "A capture follows the TUM RGB-D layout; see docs/conventions.md."});
-    }
+    return read_capture(folder, CaptureReadOptions(), progress);
+}
+
+Capture read_capture(const fs::path& folder, const CaptureReadOptions& options,
+                     const Progress& progress) {
+    const CaptureReader& reader = find_capture_reader(folder);
     Capture capture;
     capture.name = fs::absolute(folder).lexically_normal().filename().string();
-    CaptureConfig config;
-    if (fs::exists(folder / "capture.json")) config = read_capture_config(folder / "capture.json");
-    const CameraIntrinsic intrinsic = read_camera_intrinsic(folder / "camera_intrinsic.json");
-    const std::vector<FramePair> pairs = pair_frames(folder, capture.warnings);
+    log_info("{}: {} layout", folder.string(), reader.name);
+    CaptureListing listing = reader.list(folder);
+    thin_out(options.max_bytes, listing);
+    capture.warnings = listing.warnings;
+    const std::size_t count = listing.frames.size();
     const auto allowed_damage = static_cast<std::size_t>(
-        std::max(1.0, std::floor(kMaxDamagedShare * static_cast<double>(pairs.size()))));
-    std::size_t damaged = 0;
+        std::max(1.0, std::floor(kMaxDamagedShare * static_cast<double>(count))));
+    std::size_t damaged = 0, not_finite = 0;
     bool is_hdr = false;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-        progress.update(static_cast<double>(i) / static_cast<double>(pairs.size()), "reading");
-        const FramePair& pair = pairs[i];
-        RgbdFrame frame;
-        frame.id = fs::path(pair.colour_file).stem().string();
-        frame.timestamp_s = pair.timestamp_s;
-        const auto exposure = config.exposure.find(frame.id);
-        if (exposure != config.exposure.end()) frame.exposure = exposure->second;
+    double longest_exposure = 0;
+    std::vector<std::size_t> origin;  // index in the listing of each frame that was read
+    for (std::size_t i = 0; i < count; ++i) {
+        progress.update(static_cast<double>(i) / static_cast<double>(count), "reading");
+        const ListedFrame& listed = listing.frames[i];
+        Pictures pictures;
         try {
-            frame.colour = read_colour(folder / pair.colour_file, config, frame.exposure, is_hdr);
-            frame.depth_m = read_depth(folder / pair.depth_file, config.depth_scale);
+            pictures.colour = read_colour(listed.colour_file, listing.config,
+                                          exposure_of(listed, listing.config));
+            pictures.depth_m = read_depth(listed.depth_file, listing.depth_scale);
         } catch (const InputError& error) {
             if (++damaged > allowed_damage) throw;
             capture.warnings.push_back(std::string("frame left out: ") + error.what());
             continue;
         }
-        check_size(folder / pair.colour_file, frame.colour.width(), frame.colour.height(),
-                   intrinsic.camera);
-        check_size(folder / pair.depth_file, frame.depth_m.width(), frame.depth_m.height(),
-                   intrinsic.camera);
-        frame.camera = intrinsic.camera;
-        frame.camera.id = frame.id;
-        if (!intrinsic.distortion.is_none()) remove_distortion(frame, intrinsic);
-        capture.frames.push_back(std::move(frame));
+        is_hdr = is_hdr || pictures.colour.is_hdr;
+        not_finite += pictures.colour.not_finite;
+        capture.frames.push_back(make_frame(listed, listing, std::move(pictures)));
+        origin.push_back(i);
+        longest_exposure = std::max(longest_exposure, capture.frames.back().exposure);
     }
-    capture.saturation_level = is_hdr ? 1e30 : config.linear_scale;
-    set_poses(capture, folder, config);
-    capture.reference_albedo = config.reference_albedo;
-    require_usable(capture, folder, config.depth_scale);
+    if (not_finite > 0) {
+        capture.warnings.push_back(
+            fmt::format("{} colour pixels are not a number and are taken as black", not_finite));
+    }
+    capture.saturation_level =
+        is_hdr ? 1e30 : listing.config.linear_scale / std::max(longest_exposure, 1e-12);
+    capture.has_poses = listing.has_poses;
+    if (capture.has_poses) set_scale(listing, origin, folder, capture);
+    capture.reference_albedo = listing.config.reference_albedo;
+    require_usable(capture, folder, listing.depth_scale);
     progress.update(1.0, "reading");
     return capture;
 }

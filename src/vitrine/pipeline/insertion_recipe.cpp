@@ -3,6 +3,7 @@
 #include "base/file.h"
 #include "base/json_reader.h"
 #include "base/text.h"
+#include "capture/read_capture.h"
 #include "compose/composite.h"
 #include "estimate/estimate_json.h"
 #include "estimate/scene_estimate.h"
@@ -24,17 +25,9 @@ namespace {
 /// Hash of what a capture's reader looks at; pictures of truth and insertion files do not count.
 std::string hash_capture(const fs::path& folder) {
     std::uint64_t hash = hash_bytes("");
-    std::vector<std::string> files;
-    for (const char* name :
-         {"rgb.txt", "depth.txt", "associations.txt", "groundtruth.txt", "camera_intrinsic.json",
-          "depth_camera_intrinsic.json", "capture.json"}) {
-        if (fs::exists(folder / name)) files.emplace_back(name);
-    }
-    for (const char* sub : {"rgb", "depth"}) {
-        for (const std::string& file : files_below(folder, sub)) files.push_back(file);
-    }
-    for (const std::string& file : files) {
-        hash = hash_bytes(fmt::format("{} {:016x}", file, hash_file(folder / file)), hash);
+    for (const fs::path& file : capture_files(folder)) {
+        const std::string name = fs::relative(file, folder).string();
+        hash = hash_bytes(fmt::format("{} {:016x}", name, hash_file(file)), hash);
     }
     return fmt::format("{:016x}", hash);
 }
