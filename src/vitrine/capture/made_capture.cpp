@@ -26,7 +26,8 @@ MadePoint look_at_made_world(const Camera& camera, double u, double v) {
     if (enter < leave && enter < nearest) nearest = enter;
     const Vec3 p = o + nearest * d;
     return {camera.depth(p),
-            0.5 + 0.24 * std::sin(40 * p.x() + 9 * p.z()) * std::cos(30 * p.y() - 20 * p.z())};
+            0.5 + 0.24 * std::sin(40 * p.x() + 9 * p.z()) * std::cos(30 * p.y() - 20 * p.z()) +
+                0.12 * std::sin(170 * p.x() + 60 * p.z()) * std::cos(150 * p.y() - 70 * p.z())};
 }
 
 Camera MadeCapture::camera(int frame) const {

@@ -86,7 +86,9 @@ CameraIntrinsic intrinsic_of(const fs::path& folder, CaptureListing& listing) {
 }  // namespace
 
 bool is_redwood(const fs::path& folder) {
-    return !colour_folder(folder).empty() && fs::is_directory(folder / "depth");
+    // With depth.txt it is a TUM folder that lacks its rgb.txt: another unit, another pairing.
+    return !colour_folder(folder).empty() && fs::is_directory(folder / "depth") &&
+           !fs::exists(folder / "depth.txt");
 }
 
 CaptureListing list_redwood(const fs::path& folder) {

@@ -7,9 +7,9 @@
 namespace vitrine {
 namespace {
 
-/// Neighbours that differ by more of their depth do not lie on one surface. A surface seen at 80
-/// degrees steps by 1.5 % a pixel of a Kinect.
-constexpr double kMaxStep = 0.015;
+/// Neighbours on one surface differ by less than a surface seen at 80 degrees does from pixel to
+/// pixel: by this over the focal length, as a share of the depth (1.5 % for a Kinect).
+constexpr double kMaxSlope = 5.7;
 
 struct Projected {
     Vec2 pixel = Vec2::Zero();
@@ -56,13 +56,13 @@ void draw_triangle(const std::array<const Projected*, 3>& t, ImageF& out) {
 }
 
 /// A reading beside a step of depth covers its own pixel.
-void draw_pixel(const Projected& p, const Vec2& half, ImageF& out) {
+void draw_pixel(const Projected& p, const Vec2& half, double max_step, ImageF& out) {
     const Span columns(p.pixel.x() - half.x(), p.pixel.x() + half.x(), out.width());
     const Span rows(p.pixel.y() - half.y(), p.pixel.y() + half.y(), out.height());
     for (int y = rows.begin; y < rows.end; ++y) {
         for (int x = columns.begin; x < columns.end; ++x) {
             float& there = out(x, y);
-            if (there <= 0 || p.z < there * (1 - kMaxStep)) there = static_cast<float>(p.z);
+            if (there <= 0 || p.z < there * (1 - max_step)) there = static_cast<float>(p.z);
         }
     }
 }
@@ -96,10 +96,12 @@ ImageF register_depth(const ImageF& depth_m, const DepthCamera& depth_camera,
         return points[static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
                       static_cast<std::size_t>(x)];
     };
+    const Camera& own = depth_camera.intrinsic.camera;
+    const double max_step = kMaxSlope / std::min(own.fx, own.fy);
     ImageF out(colour.width, colour.height, 0.0f);
     const auto draw = [&](Projected& a, Projected& b, Projected& c) {
         const double low = std::min({a.z, b.z, c.z}), high = std::max({a.z, b.z, c.z});
-        if (low <= 0 || high - low > kMaxStep * low) {
+        if (low <= 0 || high - low > max_step * low) {
             a.is_edge = b.is_edge = c.is_edge = true;
             return;
         }
@@ -111,10 +113,9 @@ ImageF register_depth(const ImageF& depth_m, const DepthCamera& depth_camera,
             draw(at(x, y), at(x + 1, y + 1), at(x, y + 1));
         }
     }
-    const Camera& own = depth_camera.intrinsic.camera;
     const Vec2 half(0.5 * colour.fx / own.fx, 0.5 * colour.fy / own.fy);
     for (const Projected& p : points) {
-        if (p.is_edge && p.z > 0) draw_pixel(p, half, out);
+        if (p.is_edge && p.z > 0) draw_pixel(p, half, max_step, out);
     }
     return out;
 }
