@@ -37,12 +37,23 @@ void declare(CLI::App& command, RenderArguments& a) {
     command.add_option("--samples-per-pixel", a.options.samples_per_pixel, "Paths per pixel")
         ->check(CLI::Range(1, 1 << 20))
         ->group("Quality");
+    command
+        .add_option("--max-samples-per-pixel", a.options.max_samples_per_pixel,
+                    "Paths per pixel where the picture is noisy; 0: no more than everywhere")
+        ->check(CLI::Range(0, 1 << 20))
+        ->group("Quality");
+    command
+        .add_option("--noise-target", a.options.noise_target,
+                    "Standard error to reach there, as a share of the pixel's level")
+        ->check(CLI::PositiveNumber)
+        ->group("Quality");
     command.add_option("--photon-count", a.options.caustics.photon_count, "Photons shot")
         ->check(CLI::Range(1, 200'000'000))
         ->group("Quality");
     command
         .add_option("--gather-radius-m", a.options.caustics.gather_radius_m,
-                    "Radius within which photons are gathered; 0: half a pixel's width")
+                    "Radius within which the first photons are gathered, later ones within less; "
+                    "0: half a pixel's width")
         ->check(CLI::Range(0.0, 10.0))
         ->group("Quality");
     command

@@ -27,32 +27,53 @@ struct Options {
 
 Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
 
-/// Clipped as the camera does and blurred, then with - without.
-ImageRgb measured_difference(const ImageRgb& with, const ImageRgb& without, float top) {
+constexpr double kBlurPx = 2.0;
+
+/// Clipped as the camera does, then with - without.
+ImageRgb raw_difference(const ImageRgb& with, const ImageRgb& without, float top) {
     ImageRgb d(with.width(), with.height());
     for (std::size_t i = 0; i < d.size(); ++i) {
         d[i] = clipped(with[i], top) - clipped(without[i], top);
     }
-    return gaussian_blur(d, 2.0);
+    return d;
+}
+
+/// Variance of the pixel noise of `error`, from how each pixel differs from its four neighbours
+/// (what is smooth drops out), and what the blur leaves of it.
+ImageRgb blurred_noise_variance(const ImageRgb& error) {
+    ImageRgb variance(error.width(), error.height());
+    for (int y = 1; y + 1 < error.height(); ++y) {
+        for (int x = 1; x + 1 < error.width(); ++x) {
+            const Rgb around =
+                (error(x - 1, y) + error(x + 1, y) + error(x, y - 1) + error(x, y + 1)) / 4.0f;
+            variance(x, y) = (error(x, y) - around).square() /
+                             static_cast<float>(1.25 * 4 * kPi * kBlurPx * kBlurPx);
+        }
+    }
+    return variance;
 }
 
 struct RegionError {
-    double error = 0, floor = 0;
+    double error = 0;
+    double floor = 0;  ///< the truth's noise far from any change
+    double noise = 0;  ///< that of both pictures within the region
     std::size_t count = 0;
 };
 
 template <typename Inside>
 RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double noise_rms,
-                         const Inside& inside) {
-    double difference = 0, power = 0;
+                         const ImageRgb& noise_variance, const Inside& inside) {
+    double difference = 0, power = 0, noise = 0;
     RegionError result;
     for (std::size_t i = 0; i < truth.size(); ++i) {
         if (!inside(i)) continue;
         difference += (estimate[i] - truth[i]).square().sum();
         power += truth[i].square().sum();
+        noise += noise_variance[i].sum();
         ++result.count;
     }
     if (power > 0) {
+        result.noise = std::sqrt(noise / power);
         result.error = std::sqrt(difference / power);
         result.floor = noise_rms * std::sqrt(3.0 * static_cast<double>(result.count) / power);
     }
@@ -175,10 +196,15 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
         const DifferentialImage image = renderer.render(camera);
         const double seconds = timer.seconds();
         const auto top = static_cast<float>(truth.linear_scale);
-        const ImageRgb d_true = measured_difference(with, plate, top);
-        const ImageRgb d_render = measured_difference(image.with, image.without, top);
         const ImageRgb picture = composite(plate, image);
-        const ImageRgb d_composite = measured_difference(picture, plate, top);
+        const ImageRgb raw_true = raw_difference(with, plate, top);
+        const ImageRgb raw_render = raw_difference(image.with, image.without, top);
+        const ImageRgb d_true = gaussian_blur(raw_true, kBlurPx);
+        const ImageRgb d_render = gaussian_blur(raw_render, kBlurPx);
+        const ImageRgb d_composite = gaussian_blur(raw_difference(picture, plate, top), kBlurPx);
+        ImageRgb raw_error = raw_render;
+        for (std::size_t i = 0; i < raw_error.size(); ++i) raw_error[i] -= raw_true[i];
+        const ImageRgb noise_variance = blurred_noise_variance(raw_error);
         double level = 0;
         for (const Rgb& p : plate) level += clipped(p, top).mean();
         level /= static_cast<double>(plate.size());
@@ -196,23 +222,24 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
             Mask glints(plate.width(), plate.height());
             for (std::size_t i = 0; i < glints.size(); ++i) glints[i] = is_glint(i) ? 255 : 0;
             const Mask near_glint = dilate(glints, 6);
-            const RegionError calm = region_error(d_true, *d, noise, [&](std::size_t i) {
-                return object[i] > 127 && near_glint[i] < 128;
-            });
+            const RegionError calm =
+                region_error(d_true, *d, noise, noise_variance,
+                             [&](std::size_t i) { return object[i] > 127 && near_glint[i] < 128; });
             const RegionError e[4] = {
-                region_error(d_true, *d, noise, [&](std::size_t i) { return object[i] > 127; }),
-                region_error(d_true, *d, noise,
+                region_error(d_true, *d, noise, noise_variance,
+                             [&](std::size_t i) { return object[i] > 127; }),
+                region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return is_changed(i) && d_true[i].sum() < 0; }),
-                region_error(d_true, *d, noise,
+                region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return is_changed(i) && d_true[i].sum() > 0; }),
-                region_error(d_true, *d, noise, [&](std::size_t) { return true; })};
-            std::printf(
-                "%s %s %s:  object %.3f (floor %.3f, off glints %.3f)  darker %.3f (%.3f)  "
-                "brighter %.3f "
-                "(%.3f)  all %.3f (%.3f)  %.1f s\n",
-                camera.id.c_str(), options.insert.c_str(),
-                d == &d_render ? "rendered " : "composite", e[0].error, e[0].floor, calm.error,
-                e[1].error, e[1].floor, e[2].error, e[2].floor, e[3].error, e[3].floor, seconds);
+                region_error(d_true, *d, noise, noise_variance, [&](std::size_t) { return true; })};
+            std::printf("%s %s %s: error (floor far off, noise in place)", camera.id.c_str(),
+                        options.insert.c_str(), d == &d_render ? "rendered " : "composite");
+            const char* names[4] = {"object", "darker", "brighter", "all"};
+            for (std::size_t k = 0; k < 4; ++k) {
+                std::printf("  %s %.3f (%.3f, %.3f)", names[k], e[k].error, e[k].floor, e[k].noise);
+            }
+            std::printf("  object off glints %.3f  %.1f s\n", calm.error, seconds);
         }
         std::fflush(stdout);
         if (options.out.empty()) continue;

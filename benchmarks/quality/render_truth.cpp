@@ -44,6 +44,8 @@ Material read_truth_material(const JsonObject& object, const fs::path& folder) {
     ward.rho_d = read_rgb(object, "rho_d");
     ward.rho_s = read_rgb(object, "rho_s");
     ward.sigma_x = ward.sigma_y = object.number("ward_sigma_equivalent");
+    // The truth's Beckmann lobe over 4 cos cos is Duer's form but for 1 / cos^4 of the half vector.
+    ward.form = WardForm::Duer;
     return ward;
 }
 

@@ -84,6 +84,35 @@ TEST(Sampling, DirectionsFollowTheirDensity) {
                    [](double z) { return (1 - z) / 0.1; });
 }
 
+// Shapes of the plane: as many points in each cell as its share of the area.
+TEST(Sampling, PlaneShapesAreEven) {
+    constexpr int kCells = 10, kCount = 100000, kSub = 40;
+    const auto expect_even = [&](const auto& sample, const auto& is_inside, double area) {
+        std::vector<double> observed(kCells * kCells, 0.0), expected(observed.size(), 0.0);
+        Rng rng(23);
+        for (int i = 0; i < kCount; ++i) {
+            const Vec2f p = sample(Vec2f(rng.next_float(), rng.next_float()));
+            ASSERT_TRUE(is_inside(p.x(), p.y()));
+            const auto cell = [&](float v) { return std::clamp(int(v * kCells), 0, kCells - 1); };
+            observed[cell(p.y()) * kCells + cell(p.x())] += 1;
+        }
+        for (int y = 0; y < kCells * kSub; ++y) {
+            for (int x = 0; x < kCells * kSub; ++x) {
+                const double step = 1.0 / (kCells * kSub);
+                if (!is_inside((x + 0.5) * step, (y + 0.5) * step)) continue;
+                expected[y / kSub * kCells + x / kSub] += kCount * step * step / area;
+            }
+        }
+        const ChiSquareResult result = chi_square_test(observed, expected);
+        EXPECT_GT(result.p_value, 0.001) << result.description;
+    };
+    expect_even(
+        [](const Vec2f& u) { return Vec2f((sample_concentric_disc(u) * 0.5f).array() + 0.5f); },
+        [](double x, double y) { return std::hypot(x - 0.5, y - 0.5) <= 0.5 + 1e-6; }, kPi / 4);
+    expect_even([](const Vec2f& u) { return sample_triangle(u); },
+                [](double x, double y) { return x + y <= 1 + 1e-6; }, 0.5);
+}
+
 TEST(Sampling, LowDiscrepancyPointsFillTheSquare) {
     // 256 points, 16 x 16 cells: Sobol hits each once; R2 and Halton leave few empty.
     std::vector<int> sobol(256, 0), r2(256, 0), halton_cells(256, 0);
@@ -110,8 +139,7 @@ TEST(Sampling, DiscreteDistributionMatchesItsWeights) {
         ASSERT_GE(u, 0.0f);
         ASSERT_LT(u, 1.0f);
     }
-    EXPECT_EQ(counts[1], 0);
-    EXPECT_NEAR(counts[3] / 100000, 0.6, 0.01);
+    EXPECT_GT(chi_square_test(counts, std::vector<double>{1e4, 0, 3e4, 6e4}).p_value, 0.001);
     EXPECT_DOUBLE_EQ(distribution.probability(2), 0.3);
 }
 

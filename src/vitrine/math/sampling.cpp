@@ -34,9 +34,12 @@ std::uint32_t hash_combine(std::uint32_t seed, std::uint32_t v) {
     return seed ^ (v + 0x9e3779b9u + (seed << 6) + (seed >> 2));
 }
 
+/// Generator matrices, applied byte by byte: table[d][k][b] is the exclusive or of the columns of
+/// dimension d that the bits of b pick in byte k.
 struct SobolMatrices {
-    std::array<std::array<std::uint32_t, 32>, 4> column{};
+    std::array<std::array<std::array<std::uint32_t, 256>, 4>, 4> table{};
     SobolMatrices() {
+        std::array<std::array<std::uint32_t, 32>, 4> column{};
         for (int bit = 0; bit < 32; ++bit) column[0][bit] = 1u << (31 - bit);
         // Joe and Kuo 2008: degree s, coefficients a, initial numbers m of dimensions 2 to 4.
         struct Start {
@@ -60,8 +63,19 @@ struct SobolMatrices {
                 }
             }
         }
+        for (std::size_t d = 0; d < 4; ++d) {
+            for (std::size_t k = 0; k < 4; ++k) {
+                for (std::uint32_t b = 0; b < 256; ++b) {
+                    for (std::size_t bit = 0; bit < 8; ++bit) {
+                        if ((b >> bit) & 1u) table[d][k][b] ^= column[d][8 * k + bit];
+                    }
+                }
+            }
+        }
     }
 };
+
+const SobolMatrices kSobol;
 
 }  // namespace
 
@@ -126,14 +140,11 @@ float halton(std::uint64_t index, int dimension) {
 }
 
 float scrambled_sobol(std::uint32_t index, int dimension, std::uint32_t seed) {
-    static const SobolMatrices matrices;
     VITRINE_CHECK_LT(static_cast<std::size_t>(dimension), std::size_t{4});
-    const std::uint32_t shuffled = owen_scramble(index, seed);
-    std::uint32_t bits = 0;
-    for (int bit = 0; bit < 32; ++bit) {
-        if ((shuffled >> bit) & 1u)
-            bits ^= matrices.column[static_cast<std::size_t>(dimension)][bit];
-    }
+    const std::uint32_t i = owen_scramble(index, seed);
+    const auto& table = kSobol.table[static_cast<std::size_t>(dimension)];
+    std::uint32_t bits = table[0][i & 255u] ^ table[1][(i >> 8) & 255u] ^
+                         table[2][(i >> 16) & 255u] ^ table[3][i >> 24];
     bits = owen_scramble(bits, hash_combine(seed, static_cast<std::uint32_t>(dimension)));
     return static_cast<float>(bits >> 8) * 0x1p-24f;
 }

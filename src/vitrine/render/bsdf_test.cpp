@@ -112,6 +112,37 @@ TEST(Bsdf, DielectricSplitsByFresnel) {
     EXPECT_NEAR(transmitted / double(kDraws), 0.96, 1e-4);
 }
 
+// A ray and its reverse: the same share is reflected, and the compressions of radiance cancel.
+TEST(Bsdf, DielectricIsReciprocalAndKeepsEnergy) {
+    for (const float eta : {1.33f, 1.5f, 2.4f}) {
+        for (const Vec3f& wo : kViews) {
+            const BsdfSample in = sample(DielectricBsdf{eta}, wo, Vec2f(0.5f, 0.5f), 0.999f);
+            ASSERT_TRUE(in.is_transmitted);
+            // Back from inside: up is the side of the ray.
+            const Vec3f back(in.wi.x(), in.wi.y(), -in.wi.z());
+            int reflected_in = 0, reflected_back = 0;
+            constexpr int kDraws = 20000;
+            float weight_back = 0;
+            for (int i = 0; i < kDraws; ++i) {
+                const float u = (static_cast<float>(i) + 0.5f) / kDraws;
+                reflected_in +=
+                    !sample(DielectricBsdf{eta}, wo, Vec2f(0.5f, 0.5f), u).is_transmitted;
+                const BsdfSample out = sample(DielectricBsdf{1 / eta}, back, Vec2f(0.5f, 0.5f), u);
+                reflected_back += !out.is_transmitted;
+                if (out.is_transmitted) weight_back = out.weight[0];
+            }
+            EXPECT_NEAR(reflected_in, reflected_back, 2);
+            EXPECT_NEAR(weight_back * in.weight[0], 1.0f, 1e-5f);
+        }
+    }
+    const BsdfSample mirror =
+        sample(MirrorBsdf{Rgb(0.9f, 0.8f, 0.7f)}, kViews[1], Vec2f(0.5f, 0.5f), 0.5f);
+    const BsdfSample reverse =
+        sample(MirrorBsdf{Rgb(0.9f, 0.8f, 0.7f)}, mirror.wi, Vec2f(0.5f, 0.5f), 0.5f);
+    EXPECT_LT((reverse.wi - kViews[1]).norm(), 1e-6f);
+    EXPECT_LE(mirror.weight.maxCoeff(), 1.0f);
+}
+
 TEST(Sampler, PairsAreStratified) {
     // 256 points: one in each cell of 16 x 16.
     std::vector<int> count(256, 0);
@@ -144,17 +175,59 @@ TEST(Lights, DiscIrradianceIsTheClosedForm) {
     EXPECT_NEAR(sum, kPi * radiance * r * r / (r * r + h * h), 0.002);
 }
 
+// Directions to a disc against the density claimed, over cells of the disc.
+TEST(Lights, DiscSamplesFollowTheirDensity) {
+    const DiscLight disc{Vec3(0.2, 0.1, 0.5), Vec3(-0.3, 0.1, -0.9).normalized(), 0.3,
+                         Rgb::Constant(1.0f)};
+    const LightSampler lights({disc}, Rgb::Zero());
+    constexpr int kCells = 12, kDraws = 50000, kSub = 16;
+    const Frame frame(disc.normal.cast<float>());
+    const Vec3f centre = disc.position_m.cast<float>();
+    const auto radius = static_cast<float>(disc.radius_m);
+    std::vector<double> observed(kCells * kCells, 0.0), expected(observed.size(), 0.0);
+    Rng rng(12);
+    for (int i = 0; i < kDraws; ++i) {
+        const auto s = lights.sample(0, Vec3f::Zero(), Vec2f(rng.next_float(), rng.next_float()));
+        ASSERT_TRUE(s);
+        const Vec3f local = frame.to_local(s->direction * s->distance - centre) / radius;
+        const auto cell = [&](float v) {
+            return static_cast<std::size_t>(std::clamp((v + 1) / 2 * kCells, 0.0f, kCells - 1.0f));
+        };
+        observed[cell(local.y()) * kCells + cell(local.x())] += 1;
+    }
+    const double step = 2.0 * radius / (kCells * kSub);
+    for (int y = 0; y < kCells * kSub; ++y) {
+        for (int x = 0; x < kCells * kSub; ++x) {
+            const Vec2 p((x + 0.5) * step - radius, (y + 0.5) * step - radius);
+            if (p.norm() > radius) continue;
+            const Vec3f place = centre + frame.tangent * static_cast<float>(p.x()) +
+                                frame.bitangent * static_cast<float>(p.y());
+            const float distance = place.norm();
+            const Vec3f direction = place / distance;
+            const double solid_angle =
+                -direction.dot(disc.normal.cast<float>()) * step * step / (distance * distance);
+            expected[static_cast<std::size_t>(y / kSub * kCells + x / kSub)] +=
+                kDraws * lights.pdf(0, Vec3f::Zero(), direction, distance) * solid_angle;
+        }
+    }
+    EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
+}
+
 // Rays emitted towards a sphere carry what crosses it: 4 pi I times its share of the sky.
 TEST(Lights, EmittedPowerIsThatOfTheCone) {
     const Sphere target{Vec3f(0, 0, 0), 0.05f}, scene{Vec3f(0, 0, 0), 2.0f};
     const LightSampler lights(
         {PointLight{Vec3(0, 0, 1), Rgb::Constant(2.0f)},
          DirectionalLight{Vec3(0, 0.6, -0.8), Rgb::Constant(3.0f)},
-         DiscLight{Vec3(0, 0, 1), Vec3(0, 0, -1), 0.001, Rgb::Constant(2.0f)}},
+         DiscLight{Vec3(0, 0, 1), Vec3(0, 0, -1), 0.001, Rgb::Constant(2.0f)},
+         SpotLight{Vec3(0, 0, 1), Vec3(0, 0, -1), Rgb::Constant(2.0f), 30.0},
+         EnvironmentLight{std::make_shared<ImageRgb>(16, 8, Rgb::Constant(2.0f)), "", 1.5}},
         Rgb::Zero());
     const double solid_angle = cone_solid_angle(std::asin(0.05));
-    const double expected[] = {2 * solid_angle, 3 * kPi * 0.05 * 0.05, 2 * solid_angle};
-    for (std::size_t light = 0; light < 3; ++light) {
+    const double area = kPi * 0.05 * 0.05;
+    const double expected[] = {2 * solid_angle, 3 * area, 2 * solid_angle, 2 * solid_angle,
+                               2 * 1.5 * 4 * kPi * area};
+    for (std::size_t light = 0; light < std::size(expected); ++light) {
         double power = 0;
         constexpr std::uint32_t kDraws = 4096;
         for (std::uint32_t i = 0; i < kDraws; ++i) {
@@ -168,9 +241,10 @@ TEST(Lights, EnvironmentSamplesFollowTheirDensity) {
     auto map = std::make_shared<ImageRgb>(16, 8);
     for (int y = 0; y < 8; ++y) {
         for (int x = 0; x < 16; ++x) {
-            (*map)(x, y) = Rgb::Constant(static_cast<float>(1 + (x * 7 + y * 3) % 11));
+            (*map)(x, y) = Rgb::Constant(static_cast<float>((x * 7 + y * 3) % 11));  // some black
         }
     }
+    (*map)(5, 2) = Rgb(300.0f, 200.0f, 100.0f);  // a sun
     const LightSampler lights({EnvironmentLight{map, "", 1.0}}, Rgb::Zero());
     std::vector<double> observed(128, 0.0), expected(128, 0.0);
     constexpr std::uint32_t kDraws = 50000;

@@ -13,8 +13,11 @@ constexpr float kFaintBranchBoost = 4.0f;
 constexpr float kSurePower = 0.25f;
 constexpr float kSoftRadiusFactor = 4.0f;
 constexpr float kWideRadiusFactor = 8.0f;
+constexpr float kBroadRadiusFactor = 32.0f;
 constexpr float kNearFactor = 16.0f;
 constexpr float kMergeShare = 0.3f;  // of the gather radius
+/// Share of new photons that a progressive pass keeps: 2/3 shrinks noise and blur at equal rates.
+constexpr double kProgressiveShare = 2.0 / 3.0;
 
 struct Target {
     std::size_t light = 0;
@@ -262,6 +265,12 @@ class Tracer {
 
 }  // namespace
 
+double progressive_radius(double first_m, int pass) {
+    double area = first_m * first_m;
+    for (int k = 1; k <= pass; ++k) area *= (k + kProgressiveShare) / (k + 1);
+    return std::sqrt(area);
+}
+
 PhotonBalance& PhotonBalance::operator+=(const PhotonBalance& other) {
     emitted += other.emitted;
     stored += other.stored;
@@ -288,10 +297,11 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
             PhotonBalance balance;
         };
         std::vector<Block> blocks((target.count + kBlock - 1) / kBlock);
+        const std::uint64_t first = target.count * static_cast<std::uint64_t>(options.pass);
         parallel_for_blocks(target.count, kBlock, [&](std::size_t begin, std::size_t end) {
             Block& block = blocks[begin / kBlock];
             PhotonBalance ignored;
-            for (std::size_t i = begin; i < end; ++i) {
+            for (std::size_t i = first + begin; i < first + end; ++i) {
                 const std::size_t old_size = block.photons.size();
                 const bool is_touched =
                     tracer.trace(target, i, kAllParts, block.photons, block.balance);
@@ -329,6 +339,8 @@ CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather
     for (Photon& photon : sharp) photon.keeps_direction = false;
     const std::vector<Photon> merged = merge_photons(sharp, kMergeShare * wide_radius);
     maps.wide = PhotonGrid(merged, wide_radius);
+    const float broad_radius = kBroadRadiusFactor * radius;
+    maps.broad = PhotonGrid(merge_photons(merged, kMergeShare * broad_radius), broad_radius);
     std::vector<double> weights;
     for (const Photon& photon : merged) {
         const Rgb flux = photon.power * photon.diffuse_albedo();

@@ -19,8 +19,14 @@ struct CausticOptions {
     std::uint64_t photon_count = 2'000'000;  ///< rays shot, over all lights and parts
     double gather_radius_m = 0.0015;         ///< about a pixel; blurs the caustic by half of it
     int max_interfaces = 24;                 ///< bounces within glass before a photon is given up
+    int pass = 0;  ///< which stretch of `photon_count` rays of the endless sequence to shoot
     std::uint64_t seed = 0;
 };
+
+/// Gather radius of pass k = 0, 1, ... of a progressive picture whose first pass has `first_m`
+/// (Knaus and Zwicker 2011, "Progressive photon mapping: a probabilistic approach", eq. 20): the
+/// passes' mean loses both its blur and its noise as their number grows.
+double progressive_radius(double first_m, int pass);
 
 /// Where the power went, in W over the three channels: emitted = stored + escaped + absorbed +
 /// ended + chance, up to rounding.
@@ -54,11 +60,14 @@ struct SecondaryLight {
 /// Photons made ready for look-up: sharp ones with the radius asked for, soft ones (glossy lobes)
 /// with four times that. Light that a caustic scatters on to other surfaces comes from `secondary`
 /// lights when these are farther than `near_m`, and nearer by from paths that find the `wide` map:
-/// paths alone would meet a small bright spot too seldom, and lights too near are too bright.
+/// paths alone would meet a small bright spot too seldom, and lights too near are too bright. What
+/// reaches it by way of glass or mirrors is left to paths that find the `broad` map, in which the
+/// spot is 32 times the radius asked for: seldom met, it must not be bright.
 struct CausticMaps {
     PhotonGrid sharp;
     PhotonGrid soft;
     PhotonGrid wide;
+    PhotonGrid broad;
     std::vector<SecondaryLight> secondary;
     std::optional<DiscreteDistribution> secondary_choice;
     float near_m = 0.0f;

@@ -44,6 +44,64 @@ TEST(Caustics, PowerInIsPowerOut) {
     EXPECT_GT(static_cast<double>(b.met), 0.99 * static_cast<double>(b.shot));
 }
 
+// Two passes of half the rays are the rays of one pass, each with twice the power.
+TEST(Caustics, PassesContinueTheSequence) {
+    const RenderScene scene(ball_on_table(0.05));
+    CausticOptions options;
+    options.photon_count = 2000;
+    const std::vector<Photon> whole = trace_caustics(scene, options).photons;
+    options.photon_count = 1000;
+    std::vector<Photon> halves = trace_caustics(scene, options).photons;
+    options.pass = 1;
+    const std::vector<Photon> second = trace_caustics(scene, options).photons;
+    halves.insert(halves.end(), second.begin(), second.end());
+    ASSERT_EQ(whole.size(), halves.size());
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+        EXPECT_EQ(whole[i].position, halves[i].position);
+        EXPECT_NEAR(halves[i].power[0], 2 * whole[i].power[0], 1e-5f * halves[i].power[0]);
+    }
+}
+
+// The radius vanishes, so does the blur; the photons within grow without bound, so the noise does.
+TEST(Caustics, ProgressiveRadiusLosesBlurAndNoise) {
+    EXPECT_EQ(progressive_radius(0.002, 0), 0.002);
+    double found = 1;  // photons within the radius, over all passes, in units of the first's
+    for (int pass = 1; pass < 2000; ++pass) {
+        const double r = progressive_radius(1.0, pass);
+        EXPECT_LT(r, progressive_radius(1.0, pass - 1));
+        found += r * r;
+    }
+    EXPECT_LT(progressive_radius(1.0, 2000), 0.3);
+    EXPECT_NEAR(found, 1.5 * std::pow(2000.0, 2.0 / 3.0) / std::tgamma(5.0 / 3.0), 0.01 * found);
+}
+
+// Sunlight through a plate ends at a sharp edge: near it a wide gather finds too little, and
+// progressive passes less and less so.
+TEST(Caustics, ProgressivePassesSharpenAnEdge) {
+    Scene scene;
+    add(scene, make_plane(1.0), Diffuse{Rgb::Constant(0.5f), {}, {}, false});
+    add(scene, make_box(Vec3(0.2, 0.2, 0.01), Vec3(0, 0, 0.3)), Dielectric{1.5, Rgb::Zero()});
+    scene.lights.push_back(DirectionalLight{Vec3(0, 0, -1), Rgb::Constant(1.0f)});
+    const RenderScene prepared(scene);
+    // Looks under the plate at its shadow's edge, 3 mm inside.
+    const Camera camera = camera_at(Vec3(0.5, 0, 0.15), Vec3(0.097, 0, 0), 1, 1, 2000);
+    const double r = 0.04, both = (1 - r) * (1 - r) / (1 - r * r);  // all internal reflections
+    const double expected = 0.5 / kPi * both;
+    FinalOptions options;
+    options.samples_per_pixel = 128;
+    options.caustics.gather_radius_m = 0.012;
+    options.caustics.photon_count = 1 << 18;
+    options.paths.max_diffuse_bounces = 0;
+    const auto error = [&](int pass_photon_count) {
+        options.pass_photon_count = pass_photon_count;
+        const double value = render_image(prepared, camera, options).radiance[0][1];
+        return 1 - value / expected;
+    };
+    const double fixed = error(1 << 18), progressive = error(1 << 13);
+    EXPECT_GT(fixed, 0.2);
+    EXPECT_LT(progressive, 0.8 * fixed);
+}
+
 // A plate between sun and table: first-order theory with all internal reflections,
 // T = (1 - R) exp(-a s) (1 - R) / (1 - R^2 exp(-2 a s)).
 TEST(Caustics, PlateTransmitsWithAllItsReflections) {
@@ -119,9 +177,7 @@ TEST(Caustics, SameBitsForAnyThreadCount) {
 
 // Photons against paths that find a large lamp by themselves: each pixel's difference in standard
 // errors, at a level corrected for their number; and the mean.
-TEST(Caustics, PhotonsAgreeWithPaths) {
-    Scene scene = ball_on_table(0.15);
-    scene.ambient_radiance = Rgb::Constant(0.1f);
+void expect_photons_agree_with_paths(const Scene& scene) {
     const RenderScene prepared(scene);
     const Camera camera = camera_at(Vec3(-0.1, -0.3, 0.5), Vec3(-0.04, -0.03, 0), 16, 12, 30);
     FinalOptions options;
@@ -149,6 +205,42 @@ TEST(Caustics, PhotonsAgreeWithPaths) {
     const double limit = normal_quantile(1 - 0.5 * alpha);
     const auto beyond = std::count_if(z.begin(), z.end(), [&](double v) { return v > limit; });
     EXPECT_LE(beyond, static_cast<std::ptrdiff_t>(0.0125 * static_cast<double>(z.size())));
+}
+
+TEST(Caustics, PhotonsAgreeWithPaths) {
+    Scene scene = ball_on_table(0.15);
+    scene.ambient_radiance = Rgb::Constant(0.1f);
+    expect_photons_agree_with_paths(scene);
+}
+
+TEST(Caustics, GlossyPhotonsAgreeWithPaths) {
+    Scene scene = ball_on_table(0.15);
+    scene.parts.back().material =
+        Ward{Rgb::Constant(0.1f), Rgb(0.6f, 0.4f, 0.3f), 0.2, 0.2, WardForm::Duer};
+    expect_photons_agree_with_paths(scene);
+}
+
+TEST(Differential, SameBitsForAnyThreadCount) {
+    const Scene scene = ball_on_table(0.05);
+    const Camera camera = camera_at(Vec3(0.1, -0.4, 0.3), Vec3(0, 0, 0.03), 20, 12, 25);
+    Part box{"box", std::make_shared<Mesh>(make_box(Vec3(0.05, 0.05, 0.05), Vec3(-0.1, 0, 0.025))),
+             Diffuse{}, "", true};
+    DifferentialOptions options;
+    options.photon_count = 20000;
+    options.min_samples = 4;
+    options.max_samples = 16;
+    std::vector<DifferentialImage> images;
+    for (const int threads : {1, 2, 8}) {
+        set_thread_count(threads);
+        const DifferentialRenderer renderer(scene, {box}, std::vector<Camera>{camera}, options);
+        images.push_back(renderer.render(camera));
+    }
+    set_thread_count(0);
+    const auto bytes = images[0].with.size() * sizeof(Rgb);
+    for (const DifferentialImage& other : images) {
+        EXPECT_EQ(std::memcmp(images[0].with.data(), other.with.data(), bytes), 0);
+        EXPECT_EQ(std::memcmp(images[0].caustics.data(), other.caustics.data(), bytes), 0);
+    }
 }
 
 // Coloured glass on the table, coplanar with it: its shadow is lit, none of its light leaks below.

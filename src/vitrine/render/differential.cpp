@@ -1,6 +1,7 @@
 #include "render/differential.h"
 
 #include "base/parallel.h"
+#include "render/sample_plan.h"
 
 namespace vitrine {
 namespace {
@@ -31,14 +32,18 @@ RenderScene combine(Scene real, std::vector<Part> virtual_parts) {
 
 class FrameRenderer {
   public:
-    FrameRenderer(const RenderScene& scene, const CausticMaps& maps,
+    /// @param maps of the progressive passes: the samples of a pixel take turns
+    FrameRenderer(const RenderScene& scene, const std::vector<CausticMaps>& maps,
                   const TranslucentLight& translucent, const Camera& camera,
                   const DifferentialOptions& options)
         : scene_(scene),
-          tracer_(scene, maps.empty() ? nullptr : &maps, options.paths, &translucent),
           camera_(camera),
           origin_(camera.centre_in_world().cast<float>()),
-          seed_(options.seed) {}
+          seed_(options.seed) {
+        for (const CausticMaps& m : maps) {
+            tracers_.emplace_back(scene, m.empty() ? nullptr : &m, options.paths, &translucent);
+        }
+    }
 
     void add_samples(int x, int y, int target, PixelSums& sums) const {
         for (; sums.count < target; ++sums.count) {
@@ -47,14 +52,16 @@ class FrameRenderer {
             const Vec2f jitter = sampler.pair(0, 0);
             const Vec3f direction =
                 camera_.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5).cast<float>();
-            const PathResult with = tracer_.trace(origin_, direction, sampler, kAllParts);
+            const PathTracer& tracer =
+                tracers_[static_cast<std::size_t>(sums.count) % tracers_.size()];
+            const PathResult with = tracer.trace(origin_, direction, sampler, kAllParts);
             const Rgb with_total = with.total();
             sums.with += with_total.cast<double>();
             if (!with.is_touched) {
                 sums.without += with_total.cast<double>();
                 continue;
             }
-            const PathResult without = tracer_.trace(origin_, direction, sampler, kRealParts);
+            const PathResult without = tracer.trace(origin_, direction, sampler, kRealParts);
             const Rgb without_total = without.total();
             sums.without += without_total.cast<double>();
             double change = 0;
@@ -75,38 +82,23 @@ class FrameRenderer {
 
   private:
     const RenderScene& scene_;
-    PathTracer tracer_;
+    std::vector<PathTracer> tracers_;
     const Camera& camera_;
     Vec3f origin_;
     std::uint64_t seed_;
 };
 
-/// Samples each pixel should get so that its standard error falls below `target`. The variance is
-/// averaged over the neighbours: a few samples know their own spread badly.
-Image<int> plan_samples(const Image<PixelSums>& sums, double target,
-                        const DifferentialOptions& options) {
-    Image<int> plan(sums.width(), sums.height());
-    parallel_for(static_cast<std::size_t>(sums.height()), 8, [&](std::size_t row) {
-        const int y = static_cast<int>(row);
-        for (int x = 0; x < sums.width(); ++x) {
-            double variance = 0;
-            int count = 0;
-            constexpr int kReach = 2;
-            for (int dy = -kReach; dy <= kReach; ++dy) {
-                for (int dx = -kReach; dx <= kReach; ++dx) {
-                    if (!sums.contains(x + dx, y + dy)) continue;
-                    variance += sums(x + dx, y + dy).variance();
-                    ++count;
-                }
-            }
-            const PixelSums& pixel = sums(x, y);
-            variance = std::max(variance / count, pixel.variance());
-            const double wanted = pixel.count * variance / (target * target);
-            plan(x, y) = static_cast<int>(
-                std::clamp(wanted, double(pixel.count), double(options.max_samples)));
-        }
-    });
-    return plan;
+/// Samples each pixel should get so that its standard error falls below `target`.
+Image<int> plan_change(const Image<PixelSums>& sums, double target, int max_samples,
+                       int map_count) {
+    ImageF variance(sums.width(), sums.height());
+    Image<int> count(sums.width(), sums.height());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        variance[i] = static_cast<float>(sums[i].variance());
+        count[i] = sums[i].count;
+    }
+    const ImageF wanted(sums.width(), sums.height(), static_cast<float>(target * target));
+    return plan_samples(variance, count, wanted, max_samples, map_count);
 }
 
 }  // namespace
@@ -133,16 +125,21 @@ DifferentialRenderer::DifferentialRenderer(Scene real, std::vector<Part> virtual
     }
     VITRINE_CHECK_GT(radius, 0.0);
     CausticOptions caustics;
-    caustics.photon_count = options.photon_count;
     caustics.gather_radius_m = radius;
     caustics.seed = options.seed;
-    const CausticPhotons photons = trace_caustics(scene_, caustics, progress);
-    balance_ = photons.balance;
-    maps_ = build_caustic_maps(photons.photons, radius);
+    const int passes = std::max(1, options.photon_passes);
+    caustics.photon_count = options.photon_count / static_cast<std::uint64_t>(passes);
+    for (int pass = 0; pass < passes; ++pass) {
+        caustics.pass = pass;
+        const CausticPhotons photons = trace_caustics(
+            scene_, caustics, progress.part(double(pass) / passes, double(pass + 1) / passes));
+        balance_ += photons.balance;
+        maps_.push_back(build_caustic_maps(photons.photons, progressive_radius(radius, pass)));
+    }
     TranslucentLightOptions translucent;
     translucent.seed = options.seed;
-    translucent_ = light_translucent_bodies(scene_, maps_.empty() ? nullptr : &maps_, options.paths,
-                                            translucent);
+    const CausticMaps* first = maps_.front().empty() ? nullptr : &maps_.front();
+    translucent_ = light_translucent_bodies(scene_, first, options.paths, translucent);
 }
 
 DifferentialImage DifferentialRenderer::render(const Camera& camera,
@@ -170,9 +167,9 @@ DifferentialImage DifferentialRenderer::render(const Camera& camera,
     const double target = std::max(1e-12, options_.noise_target * mean);
     // Twice: the first answer rests on few samples.
     for (int round = 0; round < 2; ++round) {
-        DifferentialOptions limits = options_;
-        if (round == 0) limits.max_samples = std::min(4 * options_.min_samples, limits.max_samples);
-        const Image<int> plan = plan_samples(sums, target, limits);
+        const int limit = round == 0 ? std::min(4 * options_.min_samples, options_.max_samples)
+                                     : options_.max_samples;
+        const Image<int> plan = plan_change(sums, target, limit, static_cast<int>(maps_.size()));
         run(progress.part(round == 0 ? 0.3 : 0.5, round == 0 ? 0.5 : 1.0),
             [&](int x, int y) { return plan(x, y); });
     }

@@ -18,7 +18,8 @@ struct DifferentialOptions {
     int max_samples = 128;  ///< paths per pixel where the change is noisy
     double noise_target = 0.008;  ///< standard error per pixel, of the picture's mean luminance
     std::uint64_t photon_count = 3'000'000;
-    double gather_radius_m = 0;  ///< 0: half the width of a pixel (see `pixel_radius`)
+    int photon_passes = 4;  ///< sets they come in, each with a smaller radius than the one before
+    double gather_radius_m = 0;  ///< of the first; 0: half the width of a pixel (`pixel_radius`)
     PathOptions paths;
     std::uint64_t seed = 0;
 };
@@ -53,7 +54,7 @@ class DifferentialRenderer {
 
   private:
     RenderScene scene_;
-    CausticMaps maps_;
+    std::vector<CausticMaps> maps_;  // of the progressive passes
     TranslucentLight translucent_;
     PhotonBalance balance_;
     DifferentialOptions options_;

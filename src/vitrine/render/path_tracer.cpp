@@ -257,7 +257,8 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
         glossy += kernel * photon.power * eval_lobe(bsdf, Lobe::Glossy, wo, wi);
     };
     if (state.has_receiver) {
-        caustics_->wide.gather(point.position, point.geometric_normal, visit);
+        const PhotonGrid& map = state.is_diffuse_segment ? caustics_->wide : caustics_->broad;
+        map.gather(point.position, point.geometric_normal, visit);
     } else {
         caustics_->sharp.gather(point.position, point.geometric_normal, visit);
         caustics_->soft.gather(point.position, point.geometric_normal, visit);

@@ -1,6 +1,7 @@
 #include "render/render_image.h"
 
 #include "base/parallel.h"
+#include "render/sample_plan.h"
 
 namespace vitrine {
 
@@ -41,58 +42,159 @@ double pixel_radius(const RenderScene& scene, const Camera& camera) {
     return 0.5 * distance / std::max(camera.fx, camera.fy);
 }
 
-RenderedImage render_image(const RenderScene& scene, const Camera& camera,
-                           const CausticMaps* caustics, const FinalOptions& options,
-                           const Progress& progress) {
-    RenderedImage image{ImageRgb(camera.width, camera.height), ImageF(camera.width, camera.height)};
-    TranslucentLightOptions translucent_options;
-    translucent_options.seed = options.seed;
-    const TranslucentLight translucent =
-        light_translucent_bodies(scene, caustics, options.paths, translucent_options);
-    const PathTracer tracer(scene, caustics, options.paths, &translucent);
-    const Vec3f origin = camera.centre_in_world().cast<float>();
-    const int n = options.samples_per_pixel;
-    constexpr int kBand = 16;  // rows between two progress reports
+namespace {
+
+/// A pixel darker than this share of the picture's mean need not be known better than that is.
+constexpr double kDarkShare = 0.1;
+
+/// Fewer paths in a pass would say nothing of their spread.
+constexpr int kMinPassSamples = 4;
+
+/// Sums over the samples of one pixel.
+struct PixelSum {
+    Rgbd sum = Rgbd::Zero();
+    double square = 0;  // of the luminance
+    int count = 0;
+
+    Rgbd mean() const { return sum / count; }
+    /// Of the mean's luminance.
+    double variance() const {
+        if (count < 2) return 0;
+        const double l = luminance(mean());
+        return std::max(0.0, square / count - l * l) / (count - 1);
+    }
+};
+
+/// Calls `body(x, y)` for every pixel, in bands with a progress report after each.
+template <typename Body>
+void for_each_pixel(const Camera& camera, const Progress& progress, const Body& body) {
+    constexpr int kBand = 16;
     for (int band = 0; band < camera.height; band += kBand) {
         const int rows = std::min(kBand, camera.height - band);
         parallel_for(static_cast<std::size_t>(rows), 1, [&](std::size_t row) {
-            const int y = band + static_cast<int>(row);
-            for (int x = 0; x < camera.width; ++x) {
-                Rgbd sum = Rgbd::Zero();
-                double square = 0;
-                for (int s = 0; s < n; ++s) {
-                    const PathSampler sampler(stream_key(options.seed, unsigned(x), unsigned(y)),
-                                              static_cast<std::uint32_t>(s));
-                    const Vec2f jitter = sampler.pair(0, 0);
-                    const Vec3f direction =
-                        camera.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5)
-                            .cast<float>();
-                    const Rgb value = tracer.trace(origin, direction, sampler, kAllParts).total();
-                    sum += value.cast<double>();
-                    square += static_cast<double>(luminance(value)) * luminance(value);
-                }
-                const Rgbd mean = sum / n;
-                image.radiance(x, y) = mean.cast<float>();
-                const double l = luminance(mean);
-                image.variance(x, y) =
-                    n > 1 ? static_cast<float>(std::max(0.0, square / n - l * l) / (n - 1)) : 0.0f;
-            }
+            for (int x = 0; x < camera.width; ++x) body(x, band + static_cast<int>(row));
         });
         progress.update(static_cast<double>(band + rows) / camera.height, "render");
     }
+}
+
+/// Paths each pixel should get in every pass, after what the first ones showed.
+Image<int> plan_pass(const Image<PixelSum>& sums, const FinalOptions& options, int pass_count) {
+    double mean = 0;
+    for (const PixelSum& s : sums) mean += luminance(s.mean()) / static_cast<double>(sums.size());
+    ImageF variance(sums.width(), sums.height()), target(sums.width(), sums.height());
+    Image<int> count(sums.width(), sums.height());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const double level = std::hypot(luminance(sums[i].mean()), kDarkShare * mean);
+        const double error = std::max(1e-12, options.noise_target * level);
+        variance[i] = static_cast<float>(sums[i].variance());
+        target[i] = static_cast<float>(error * error * pass_count);
+        count[i] = sums[i].count;
+    }
+    return plan_samples(variance, count, target, options.max_samples_per_pixel / pass_count);
+}
+
+class ImageSampler {
+  public:
+    ImageSampler(const RenderScene& scene, const CausticMaps* caustics, const Camera& camera,
+                 const TranslucentLight& translucent, const FinalOptions& options)
+        : tracer_(scene, caustics, options.paths, &translucent),
+          camera_(camera),
+          origin_(camera.centre_in_world().cast<float>()),
+          seed_(options.seed) {}
+
+    /// Brings the pixel to `target` samples.
+    void add_samples(int x, int y, int target, PixelSum& sums) const {
+        for (; sums.count < target; ++sums.count) {
+            const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)),
+                                      static_cast<std::uint32_t>(sums.count));
+            const Vec2f jitter = sampler.pair(0, 0);
+            const Vec3f direction =
+                camera_.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5).cast<float>();
+            const Rgb value = tracer_.trace(origin_, direction, sampler, kAllParts).total();
+            sums.sum += value.cast<double>();
+            sums.square += static_cast<double>(luminance(value)) * luminance(value);
+        }
+    }
+
+  private:
+    PathTracer tracer_;
+    const Camera& camera_;
+    Vec3f origin_;
+    std::uint64_t seed_;
+};
+
+/// The mean over passes; `maps_of(pass, progress)` gives the photons of each (null: none).
+template <typename MapsOf>
+RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
+                            const FinalOptions& options, int pass_count, const MapsOf& maps_of,
+                            const Progress& progress) {
+    Image<PixelSum> sums(camera.width, camera.height, PixelSum{});
+    // The same in all passes, so that the mean over samples is that over passes.
+    Image<int> plan(camera.width, camera.height,
+                    std::max(1, (options.samples_per_pixel + pass_count - 1) / pass_count));
+    TranslucentLight translucent;
+    for (int pass = 0; pass < pass_count; ++pass) {
+        const double start = double(pass) / pass_count, share = 1.0 / pass_count;
+        const CausticMaps* maps = maps_of(pass, progress.part(start, start + 0.15 * share));
+        if (pass == 0) {
+            TranslucentLightOptions translucent_options;
+            translucent_options.seed = options.seed;
+            translucent = light_translucent_bodies(scene, maps, options.paths, translucent_options);
+        }
+        const ImageSampler sampler(scene, maps, camera, translucent, options);
+        const auto run = [&](double from, double to) {
+            for_each_pixel(camera, progress.part(start + from * share, start + to * share),
+                           [&](int x, int y) {
+                               sampler.add_samples(x, y, plan(x, y) * (pass + 1), sums(x, y));
+                           });
+        };
+        const bool is_planned = pass > 0 || options.max_samples_per_pixel <= 0;
+        run(0.15, is_planned ? 1.0 : 0.4);
+        if (!is_planned) {
+            plan = plan_pass(sums, options, pass_count);
+            run(0.4, 1.0);
+        }
+    }
+    RenderedImage image{ImageRgb(camera.width, camera.height), ImageF(camera.width, camera.height)};
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        image.radiance[i] = sums[i].mean().cast<float>();
+        image.variance[i] = static_cast<float>(sums[i].variance());
+    }
     return image;
+}
+
+}  // namespace
+
+RenderedImage render_image(const RenderScene& scene, const Camera& camera,
+                           const CausticMaps* caustics, const FinalOptions& options,
+                           const Progress& progress) {
+    return render_passes(
+        scene, camera, options, 1, [&](int, const Progress&) { return caustics; }, progress);
 }
 
 RenderedImage render_image(const RenderScene& scene, const Camera& camera,
                            const FinalOptions& options, const Progress& progress) {
     if (!options.use_photons) return render_image(scene, camera, nullptr, options, progress);
-    CausticOptions caustic_options = options.caustics;
-    if (caustic_options.gather_radius_m <= 0) {
-        caustic_options.gather_radius_m = pixel_radius(scene, camera);
+    CausticOptions pass_options = options.caustics;
+    if (pass_options.gather_radius_m <= 0) {
+        pass_options.gather_radius_m = pixel_radius(scene, camera);
     }
-    const CausticPhotons photons = trace_caustics(scene, caustic_options, progress.part(0.0, 0.15));
-    const CausticMaps maps = build_caustic_maps(photons.photons, caustic_options.gather_radius_m);
-    return render_image(scene, camera, &maps, options, progress.part(0.15, 1.0));
+    const double first_radius_m = pass_options.gather_radius_m;
+    const auto pass_count = static_cast<int>(std::clamp<std::uint64_t>(
+        options.caustics.photon_count / options.pass_photon_count, 1,
+        static_cast<std::uint64_t>(std::max(1, options.samples_per_pixel / kMinPassSamples))));
+    pass_options.photon_count = options.caustics.photon_count / std::uint64_t(pass_count);
+    CausticMaps maps;
+    const auto maps_of = [&](int pass, const Progress& step) {
+        pass_options.pass = pass;
+        pass_options.gather_radius_m = progressive_radius(first_radius_m, pass);
+        maps = {};  // one pass in memory at a time
+        const CausticPhotons photons = trace_caustics(scene, pass_options, step);
+        maps = build_caustic_maps(photons.photons, pass_options.gather_radius_m);
+        return &maps;
+    };
+    return render_passes(scene, camera, options, pass_count, maps_of, progress);
 }
 
 }  // namespace vitrine

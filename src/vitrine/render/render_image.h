@@ -10,9 +10,13 @@
 namespace vitrine {
 
 struct FinalOptions {
-    int samples_per_pixel = 64;
-    bool use_photons = true;  ///< false: the reference path tracer alone
-    CausticOptions caustics;  ///< `gather_radius_m` 0: half a pixel's width at the scene's centre
+    int samples_per_pixel = 64;       ///< everywhere
+    int max_samples_per_pixel = 0;    ///< where the picture is noisy; 0: no more than everywhere
+    double noise_target = 0.01;       ///< standard error wanted there, of the pixel's own level
+    bool use_photons = true;          ///< false: the reference path tracer alone
+    int pass_photon_count = 500'000;  ///< photons of a progressive pass; more of them, more passes
+    /// `gather_radius_m` is that of the first pass; 0: half a pixel's width at the scene's centre.
+    CausticOptions caustics;
     PathOptions paths;
     std::uint64_t seed = 0;
 };
@@ -37,10 +41,11 @@ Geometry render_geometry(const RenderScene& scene, const Camera& camera,
 double pixel_radius(const RenderScene& scene, const Camera& camera);
 
 /// Box filter of one pixel. The same bits for any number of threads. Costs about 1 us per sample
-/// and bounce and core.
+/// and bounce and core. Photons come in passes of shrinking radius, each with its share of the
+/// paths, so that memory is that of one pass; the picture is the mean of the passes.
 RenderedImage render_image(const RenderScene& scene, const Camera& camera,
                            const FinalOptions& options = {}, const Progress& progress = {});
-/// With photons traced before, e.g. for several cameras.
+/// With photons traced before, e.g. for several cameras: fixed radius.
 RenderedImage render_image(const RenderScene& scene, const Camera& camera,
                            const CausticMaps* caustics, const FinalOptions& options = {},
                            const Progress& progress = {});

@@ -1,5 +1,6 @@
 #include "geometry/primitives.h"
 #include "render/render_image.h"
+#include "render/sample_plan.h"
 
 #include <gtest/gtest.h>
 
@@ -23,20 +24,25 @@ double mean_radiance(const ImageRgb& image) {
 }
 
 // A point light of pi W/sr in the centre of a sphere of radius 1, albedo a: E = pi everywhere,
-// plus all bounces: L = a / (1 - a).
+// plus all bounces, 1 / (1 - a) times that: L = a / (1 - a).
 TEST(PathTracer, InsideOfASphere) {
     Scene scene;
+    const Rgb albedo(0.2f, 0.5f, 0.8f);
     scene.parts.push_back(
-        make_part(make_sphere(1.0, Vec3::Zero(), 64), Diffuse{Rgb::Constant(0.5f), {}, {}, false}));
+        make_part(make_sphere(1.0, Vec3::Zero(), 64), Diffuse{albedo, {}, {}, false}));
     scene.lights.push_back(PointLight{Vec3::Zero(), Rgb::Constant(kPif)});
     const RenderScene prepared(scene);
     FinalOptions options;
     options.use_photons = false;
     options.samples_per_pixel = 64;
-    options.paths.max_diffuse_bounces = 20;
+    options.paths.max_diffuse_bounces = 60;
     const auto image =
         render_image(prepared, small_camera(Vec3(0.2, 0.1, 0), Vec3(1, 0, 0.1), 10, 8), options);
-    EXPECT_NEAR(mean_radiance(image.radiance), 1.0, 0.01);
+    Rgb mean = Rgb::Zero();
+    for (const Rgb& p : image.radiance) mean += p / static_cast<float>(image.radiance.size());
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(mean[c] / (albedo[c] / (1 - albedo[c])), 1.0, 0.01) << c;
+    }
 }
 
 // Albedo a within a uniform environment: the furnace returns a exactly for a convex body.
@@ -52,6 +58,60 @@ TEST(PathTracer, ConvexBodyInAFurnace) {
                                         small_camera(Vec3(1, 0, 0), Vec3::Zero(), 8, 60), options);
         EXPECT_NEAR(mean_radiance(image.radiance), albedo, 0.002);
     }
+}
+
+// The same under an environment map that is uniform, found by sampling it and by chance.
+TEST(PathTracer, UniformEnvironmentMapIsAFurnace) {
+    Scene scene;
+    scene.parts.push_back(
+        make_part(make_sphere(0.1, Vec3::Zero(), 48), Diffuse{Rgb::Constant(0.7f), {}, {}, false}));
+    scene.lights.push_back(
+        EnvironmentLight{std::make_shared<ImageRgb>(16, 8, Rgb::Constant(2.0f)), "", 0.5});
+    FinalOptions options;
+    options.samples_per_pixel = 64;
+    const auto image =
+        render_image(RenderScene(scene), small_camera(Vec3(1, 0, 0), Vec3::Zero(), 8, 60), options);
+    EXPECT_NEAR(mean_radiance(image.radiance), 0.7, 0.004);
+}
+
+// Noise is evened out: where the lamp's penumbra is, more paths; nowhere less than asked for.
+TEST(RenderImage, NoisyPixelsGetMoreSamples) {
+    Scene scene;
+    scene.parts.push_back(make_part(make_plane(1.0), Diffuse{Rgb::Constant(0.5f), {}, {}, false}));
+    scene.parts.push_back(make_part(make_box(Vec3(0.2, 0.2, 0.2), Vec3(0, 0, 0.2)),
+                                    Diffuse{Rgb::Zero(), {}, {}, false}));
+    scene.lights.push_back(DiscLight{Vec3(0, 0, 1), Vec3(0, 0, -1), 0.2, Rgb::Constant(1.0f)});
+    const RenderScene prepared(scene);
+    const Camera camera = small_camera(Vec3(0, -1, 0.6), Vec3(0, 0, 0), 24, 40);
+    FinalOptions options;
+    options.use_photons = false;
+    options.samples_per_pixel = 16;
+    options.noise_target = 0.02;
+    const auto worst = [&](int max_samples) {
+        options.max_samples_per_pixel = max_samples;
+        const RenderedImage image = render_image(prepared, camera, options);
+        double error = 0;
+        const double mean = mean_radiance(image.radiance);
+        for (std::size_t i = 0; i < image.radiance.size(); ++i) {
+            const double level = std::hypot(luminance(image.radiance[i]), 0.1 * mean);
+            error = std::max(error, std::sqrt(image.variance[i]) / level);
+        }
+        return error;
+    };
+    const double plain = worst(0), adaptive = worst(1024);
+    EXPECT_GT(plain, 0.04);
+    EXPECT_LT(adaptive, 0.03);
+}
+
+TEST(SamplePlan, SamplesFollowTheVariance) {
+    ImageF variance(9, 1, 1.0f), target(9, 1, 1.0f);
+    const Image<int> count(9, 1, 8);
+    for (int x = 5; x < 9; ++x) variance(x, 0) = 4.0f;
+    const Image<int> plan = plan_samples(variance, count, target, 1000, 5);
+    EXPECT_EQ(plan(0, 0), 10);  // 8, rounded up to a multiple of 5
+    EXPECT_EQ(plan(8, 0), 35);  // 32
+    EXPECT_EQ(plan_samples(variance, count, target, 20)(8, 0), 20);
+    EXPECT_EQ(plan_samples(variance, count, target, 4)(8, 0), 8);  // what is done is done
 }
 
 // Clear glass in a uniform environment is invisible: all that is lost is reflected.

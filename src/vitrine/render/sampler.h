@@ -6,12 +6,14 @@
 #pragma once
 
 #include "base/rng.h"
-#include "math/vector.h"
+#include "math/sampling.h"
 
 namespace vitrine {
 
 /// Point `index` of a (0, 2)-sequence, scrambled by `seed`: any 2^k points from 0 are stratified.
-Vec2f sobol_pair(std::uint32_t index, std::uint32_t seed);
+inline Vec2f sobol_pair(std::uint32_t index, std::uint32_t seed) {
+    return {scrambled_sobol(index, 0, seed), scrambled_sobol(index, 1, seed)};
+}
 
 class PathSampler {
   public:
