@@ -112,10 +112,23 @@ void print_bins(const ImageRgb& image, const ImageRgb& reference, const Mask& re
     std::printf("\n");
 }
 
-void print_check_pixel(const ImageRgb& image, const ImageRgb& reference, int x, int y) {
-    const float ours = image(x, y).mean(), theirs = reference(x, y).mean();
-    std::printf("  check pixel (%d, %d): %.7f, reference %.7f, ratio %.4f\n", x, y, ours, theirs,
-                ours / theirs);
+/// A pixel of the open table: our picture, direct light alone in closed form (what the other
+/// renderers were checked with), the reference with its interreflection's noise.
+void print_check_pixel(const ImageRgb& image, const ImageRgb& reference, const Scene& scene,
+                       const Camera& camera, int x, int y) {
+    const Vec3 eye = camera.centre_in_world(), ray = camera.ray_in_world(x, y);
+    const Vec3 place = eye - ray * (eye.z() / ray.z());
+    const auto& lamp = std::get<PointLight>(scene.lights.front());
+    const Vec3 to_lamp = lamp.position_m - place;
+    const double albedo = std::get<Diffuse>(scene.parts.front().material).albedo.mean();
+    const double direct =
+        albedo / kPi * lamp.intensity_w_per_sr.mean() * to_lamp.z() / std::pow(to_lamp.norm(), 3);
+    const double ours = image(x, y).mean();
+    std::printf(
+        "  check pixel (%d, %d): %.7f; direct light %.7f, ratio %.4f; reference %.7f, ratio "
+        "%.4f\n",
+        x, y, ours, direct, ours / direct, double(reference(x, y).mean()),
+        ours / reference(x, y).mean());
 }
 
 void write_error(const fs::path& path, const ImageRgb& image, const ImageRgb& reference) {
@@ -146,9 +159,9 @@ void measure(const Options& options, int number, std::uint64_t photon_count) {
         "inside sphere relMSE %.5f (energy %.4f)  %.2f CPU s\n",
         number, static_cast<unsigned long long>(photon_count), render.samples_per_pixel, d.relative,
         d.normalised, core.energy, s.relative, s.energy, seconds);
-    if (number == 0) print_check_pixel(image, truth, 150, 250);
+    if (number == 0) print_check_pixel(image, truth, reference.scene, camera, 150, 250);
     if (number >= 2) print_bins(image, truth, regions.table);
-    if (number == 2) print_check_pixel(image, truth, 100, 300);
+    if (number == 2) print_check_pixel(image, truth, reference.scene, camera, 100, 300);
     std::fflush(stdout);
     if (options.out.empty()) return;
     fs::create_directories(options.out);
