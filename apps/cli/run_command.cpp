@@ -12,8 +12,10 @@ namespace {
 
 struct RunArguments {
     std::string capture, out, poses = "refine", geometry, overrides, ior_step, insertion, at,
-                              quality = "final";
-    bool lambertian = false;
+                              quality = "final", method = "default";
+    int light_photon_count = PaperOptions().lights.photon_count;
+    double caustic_photon_count = PaperOptions().caustic_photon_count;
+    bool lambertian = false, certificate = false;
     std::uint64_t photon_count = 0;
 };
 
@@ -24,6 +26,10 @@ PoseMode pose_mode(const std::string& word) {
 InsertionRunOptions run_options(const RunArguments& arguments, std::uint64_t seed) {
     InsertionRunOptions options;
     options.poses = pose_mode(arguments.poses);
+    options.method = method_from_name(arguments.method);
+    options.paper.lights.photon_count = arguments.light_photon_count;
+    options.paper.caustic_photon_count = arguments.caustic_photon_count;
+    options.certificate = arguments.certificate;
     options.lambertian = arguments.lambertian;
     options.geometry = arguments.geometry;
     options.overrides = arguments.overrides;
@@ -85,11 +91,34 @@ void add_stage(CLI::App& root, const std::string& name, const std::string& summa
                          "JSON of what you know: classes, indices, lights; it is not estimated")
             ->check(CLI::ExistingFile)
             ->group("Input");
+        command
+            ->add_option("--method", arguments->method,
+                         "default, paper (the published joint optimisation), or the baselines it "
+                         "compares with: local, inverse-photon")
+            ->capture_default_str()
+            ->check(CLI::IsMember({"default", "paper", "local", "inverse-photon"}))
+            ->group("Quality");
+        command
+            ->add_option("--light-photons", arguments->light_photon_count,
+                         "Photons of each of 36 trial lights (paper, inverse-photon)")
+            ->capture_default_str()
+            ->check(CLI::Range(1000, 100'000'000))
+            ->group("Quality");
     }
     if (last >= InsertionStage::Materials) {
         command
+            ->add_option("--caustic-photons", arguments->caustic_photon_count,
+                         "Photons per trial index, light and place (paper)")
+            ->capture_default_str()
+            ->check(CLI::Range(1e3, 1e9))
+            ->group("Quality");
+        command
             ->add_flag("--lambertian", arguments->lambertian,
                        "Take every object as diffuse (baseline for comparison)")
+            ->group("Quality");
+        command
+            ->add_flag("--certificate", arguments->certificate,
+                       "Prove the best roughness of each metal by branch and bound")
             ->group("Quality");
         command
             ->add_option("--ior-step", arguments->ior_step,

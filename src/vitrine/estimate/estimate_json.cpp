@@ -48,7 +48,11 @@ Json cluster_json(const WardCluster& cluster) {
     j["area_fraction"] = cluster.area_fraction;
     j["rho_d"] = to_json(fit.ward.rho_d);
     j["rho_s"] = to_json(fit.ward.rho_s);
-    j["sigma"] = fit.ward.sigma_x;
+    j["sigma"] = fit.sigma.value;
+    if (fit.ward.sigma_x != fit.ward.sigma_y) {
+        j["sigma_x"] = fit.ward.sigma_x;
+        j["sigma_y"] = fit.ward.sigma_y;
+    }
     j["form"] = fit.ward.form == WardForm::Duer ? "duer" : "ward";
     j["stddev_rho_d"] = to_json(fit.stddev_rho_d);
     j["stddev_rho_s"] = to_json(fit.stddev_rho_s);
@@ -56,6 +60,13 @@ Json cluster_json(const WardCluster& cluster) {
     j["outcome"] = outcome_name(fit.sigma.outcome);
     if (!fit.sigma.reason.empty()) j["reason"] = fit.sigma.reason;
     j["residual"] = fit.sigma.residual_rms;
+    if (fit.certificate)
+        j["certificate"] = {{"sigma", fit.certificate->sigma},
+                            {"lower_bound", fit.certificate->lower_bound},
+                            {"upper_bound", fit.certificate->upper_bound},
+                            {"relative_gap", fit.certificate->relative_gap()},
+                            {"nodes", fit.certificate->nodes},
+                            {"is_complete", fit.certificate->is_complete}};
     return j;
 }
 
@@ -66,6 +77,8 @@ WardCluster read_cluster(const JsonObject& j) {
     fit.ward.rho_d = read_rgb(j, "rho_d");
     fit.ward.rho_s = read_rgb(j, "rho_s");
     fit.ward.sigma_x = fit.ward.sigma_y = fit.sigma.value = j.number("sigma");
+    fit.ward.sigma_x = j.number_or("sigma_x", fit.sigma.value);
+    fit.ward.sigma_y = j.number_or("sigma_y", fit.sigma.value);
     fit.ward.form = j.choice("form", {"ward", "duer"}) == "duer" ? WardForm::Duer : WardForm::Ward;
     if (j.has("stddev_rho_d")) fit.stddev_rho_d = read_rgb(j, "stddev_rho_d");
     if (j.has("stddev_rho_s")) fit.stddev_rho_s = read_rgb(j, "stddev_rho_s");
@@ -164,6 +177,7 @@ void write_estimate(const std::filesystem::path& path, const SceneEstimate& esti
     const LightEstimate& light = estimate.light;
     Json j;
     j["schema"] = "vitrine.estimate/1";
+    j["method"] = method_name(estimate.method);
     j["reference_point_m"] = to_json(light.reference_point_m);
     j["support_plane"] = {{"normal", to_json(light.plane.normal)},
                           {"offset_m", light.plane.offset}};
@@ -186,6 +200,9 @@ SceneEstimate read_estimate(const std::filesystem::path& path) {
     const JsonObject j = read_json_file(path);
     j.choice("schema", {"vitrine.estimate/1"});
     SceneEstimate estimate;
+    if (j.has("method"))
+        estimate.method =
+            method_from_name(j.choice("method", {"default", "paper", "local", "inverse-photon"}));
     LightEstimate& light = estimate.light;
     light.reference_point_m = read_vec3(j, "reference_point_m");
     if (j.has("support_plane")) {

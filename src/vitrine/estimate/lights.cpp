@@ -1,6 +1,7 @@
 #include "estimate/lights.h"
 
 #include "base/log.h"
+#include "estimate/light_data.h"
 #include "estimate/light_search.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
@@ -14,7 +15,6 @@ namespace {
 
 constexpr int kScoutStride = 3;     // one third of the samples finds the basin
 constexpr std::size_t kStarts = 4;  // grid lights that are refined
-constexpr int kMinSamples = 200;
 // A second light must explain this share of what one leaves (by evidence, see docs/estimation.md).
 constexpr double kSecondLightGain = 0.18;
 constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are texture
@@ -23,53 +23,6 @@ constexpr double kMinSeparationRad = 0.436;
 // uniform emission, a mesh 1 mm off): the share found by comparing with known lights.
 constexpr double kModelDeviationRad = 0.009;
 constexpr double kModelLogDistance = 0.02;
-
-struct Masks {
-    std::uint32_t opaque = kScanMask, see_through = 0;
-};
-
-Masks masks_of(const EstimationScene& scene, const std::vector<ObjectClass>& classes) {
-    Masks masks;
-    for (int k = 0; k < scene.object_count(); ++k) {
-        const auto index = static_cast<std::size_t>(k);
-        const ObjectClass c = index < classes.size() ? classes[index] : ObjectClass::Unsure;
-        const bool is_opaque = c == ObjectClass::Specular || c == ObjectClass::Diffuse;
-        (is_opaque ? masks.opaque : masks.see_through) |= object_mask(k);
-    }
-    masks.see_through &= ~masks.opaque;
-    return masks;
-}
-
-std::optional<ReferenceSample> find_reference(const EstimationScene& scene,
-                                              const FrameLookup& lookup,
-                                              const std::optional<ReferenceAlbedo>& reference) {
-    if (!reference) return std::nullopt;
-    for (std::size_t f = 0; f < lookup.frames().size(); ++f) {
-        const RgbdFrame& frame = lookup.frames()[f];
-        if (frame.id != reference->frame) continue;
-        const Camera& camera = lookup.cameras()[f];
-        const Vec3f origin = camera.centre_in_world().cast<float>();
-        const Vec3f direction =
-            camera.ray_in_world(reference->pixel.x(), reference->pixel.y()).cast<float>();
-        const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, kAllMask});
-        if (!hit.is_hit() || scene.object_of_part(hit.part) >= 0) return std::nullopt;
-        ReferenceSample sample;
-        const Mesh& mesh = scene.mesh(hit.part);
-        sample.point = {hit_point(mesh, hit), shading_normal(mesh, hit)};
-        sample.albedo = reference->albedo;
-        for (int c = 0; c < 3; ++c) {
-            std::vector<double> patch;
-            for (int dy = -2; dy <= 2; ++dy)
-                for (int dx = -2; dx <= 2; ++dx)
-                    patch.push_back(
-                        frame.colour.clamped(static_cast<int>(reference->pixel.x()) + dx,
-                                             static_cast<int>(reference->pixel.y()) + dy)[c]);
-            sample.radiance[c] = static_cast<float>(median(patch));
-        }
-        return sample;
-    }
-    return std::nullopt;
-}
 
 LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEstimate& estimate,
                      const Progress& progress) {
@@ -185,29 +138,12 @@ LightSet from_lights(const std::vector<DiscLight>& lights, const Vec3& reference
 LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> frames,
                               double saturation_level, const LightOptions& options,
                               const Progress& progress) {
-    LightEstimate estimate;
-    const EstimationScene world(scene);
-    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
-    const Masks masks = masks_of(world, options.object_classes);
-    const std::vector<Rgb> object_radiance = mean_object_radiance(world, lookup);
-    const ScanSamples samples =
-        sample_scan(world, lookup, masks.see_through, object_radiance, options.samples);
-    estimate.reference_point_m = samples.reference_point;
-    estimate.scene_radius_m = samples.scene_radius_m;
-    estimate.plane = samples.plane;
-    estimate.albedo_anchor = "mean_albedo";
-    if (samples.saturated_count > samples.tried_count / 2) {
-        estimate.reason = "most of the scan is clipped in every picture: expose for the table";
-        return estimate;
-    }
-    if (static_cast<int>(samples.points.size()) < kMinSamples) {
-        estimate.reason = "too few scanned points are seen without occlusion";
-        return estimate;
-    }
-    const std::optional<ReferenceSample> reference =
-        find_reference(world, lookup, options.reference_albedo);
-    if (reference) estimate.albedo_anchor = "reference_albedo";
-    const LightFit fit(world, samples, reference, masks.opaque, masks.see_through, options.seed);
+    const LightData data(scene, frames, saturation_level, options);
+    LightEstimate estimate = data.start_estimate();
+    if (!data.problem.empty()) return estimate;
+    const ScanSamples& samples = data.samples;
+    const LightFit fit(data.world, samples, data.reference, data.opaque_mask, data.see_through_mask,
+                       options.seed);
     progress.update(0.15, "searching the hemisphere");
 
     LightSet set;

@@ -1,6 +1,7 @@
 #include "estimate/materials.h"
 
 #include "base/log.h"
+#include "estimate/object_context.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,13 +13,6 @@ namespace {
 // A lobe must improve a diffuse fit by this much (in the logarithm) to be believed.
 constexpr double kLobeGain = 0.15;
 constexpr int kMinPixels = 60;
-
-const ObjectOverride* find_override(const std::vector<ObjectOverride>& overrides,
-                                    const std::string& id) {
-    for (const ObjectOverride& o : overrides)
-        if (o.id == id) return &o;
-    return nullptr;
-}
 
 double log_ratio(double a, double b) { return std::log(std::max(a, 1e-4) / std::max(b, 1e-4)); }
 
@@ -37,6 +31,13 @@ ObjectClass classify(ObjectEstimate& object, const WardFit& ward, double unsure_
 
 }  // namespace
 
+const ObjectOverride* find_override(const std::vector<ObjectOverride>& overrides,
+                                    const std::string& id) {
+    for (const ObjectOverride& o : overrides)
+        if (o.id == id) return &o;
+    return nullptr;
+}
+
 std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
                                                std::span<const RgbdFrame> frames,
                                                double saturation_level, const LightEstimate& lights,
@@ -44,12 +45,10 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
                                                const MaterialOptions& options,
                                                const Progress& progress) {
     std::vector<ObjectEstimate> objects;
-    const EstimationScene world(scene);
-    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
-    const double bright = bright_level(lookup);
-    KnownLight known;
-    known.ambient = lights.ambient_radiance;
-    for (const FittedLight& fitted : lights.lights) known.lights.push_back(fitted.light);
+    const ObjectContext context(scene, frames, saturation_level, lights);
+    const EstimationScene& world = context.world;
+    const FrameLookup& lookup = context.lookup;
+    const double bright = context.bright;
 
     for (int k = 0; k < world.object_count(); ++k) {
         progress.update(static_cast<double>(k) / world.object_count(), "materials");
@@ -72,8 +71,7 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         }
         const TransparentFit solid = fit_solid(world, lookup, k, pixels, bright, transparent);
         const TransparentFit shell = fit_shell(world, lookup, k, pixels, bright, transparent);
-        known.opaque_mask = kScanMask | object_mask(k);
-        const SpecularModel model(world, pixels, known, options.specular);
+        const SpecularModel model(world, pixels, context.light_on(k), options.specular);
         const WardFit ward = fit_ward(model, bright, options.specular);
         object.cost_solid = solid.cost;
         object.cost_shell = shell.cost;
@@ -105,20 +103,17 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
 void refit_specular(const Scene& scene, std::span<const RgbdFrame> frames, double saturation_level,
                     const LightEstimate& lights, const MaterialOptions& options,
                     std::vector<ObjectEstimate>& objects, const Progress& progress) {
-    const EstimationScene world(scene);
-    const FrameLookup lookup(world, scene.cameras, frames, saturation_level);
-    const double bright = bright_level(lookup);
-    KnownLight known;
-    known.ambient = lights.ambient_radiance;
-    for (const FittedLight& fitted : lights.lights) known.lights.push_back(fitted.light);
+    const ObjectContext context(scene, frames, saturation_level, lights);
+    const EstimationScene& world = context.world;
+    const FrameLookup& lookup = context.lookup;
+    const double bright = context.bright;
     for (int k = 0; k < world.object_count(); ++k) {
         progress.update(static_cast<double>(k) / world.object_count(), "materials again");
         ObjectEstimate& object = objects[static_cast<std::size_t>(k)];
         if (object.object_class == ObjectClass::Transparent) continue;
         const std::vector<ObjectPixel> pixels = object_pixels(world, lookup, k, options.pixels);
         if (static_cast<int>(pixels.size()) < kMinPixels) continue;
-        known.opaque_mask = kScanMask | object_mask(k);
-        const SpecularModel model(world, pixels, known, options.specular);
+        const SpecularModel model(world, pixels, context.light_on(k), options.specular);
         const WardFit ward = fit_ward(model, bright, options.specular);
         object.cost_ward = ward.cost;
         object.cost_diffuse = ward.cost_diffuse;

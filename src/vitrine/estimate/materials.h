@@ -28,6 +28,10 @@ struct ObjectOverride {
     bool ignore = false;  ///< not an object: treated as diffuse
 };
 
+/// The override of candidate `id`; null when there is none.
+const ObjectOverride* find_override(const std::vector<ObjectOverride>& overrides,
+                                    const std::string& id);
+
 struct WardCluster {
     double area_fraction = 1.0;
     WardFit fit;

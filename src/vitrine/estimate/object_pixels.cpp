@@ -90,6 +90,9 @@ std::vector<ObjectPixel> object_pixels(const EstimationScene& scene, const Frame
                 if (!hit.is_hit()) continue;
                 pixel.surface = {hit_point(mesh, hit), shading_normal(mesh, hit)};
                 pixel.radiance = colour(u, v);
+                for (int c = 0; c < 3; ++c)
+                    pixel.is_at_least[static_cast<std::size_t>(c)] =
+                        is_saturated(Rgb::Constant(pixel.radiance[c]), lookup.saturation_level());
                 for (int dv = -1; dv <= 1; ++dv)
                     for (int du = -1; du <= 1; ++du)
                         pixel.is_clipped |= lookup.is_clipped(colour.clamped(u + du, v + dv));

@@ -3,6 +3,7 @@
 
 #include "estimate/observations.h"
 
+#include <array>
 #include <vector>
 
 namespace vitrine {
@@ -15,7 +16,8 @@ struct ObjectPixel {
     Vec3f direction = Vec3f::Zero();  ///< unit, away from the camera
     SurfacePoint surface;
     Rgb radiance = Rgb::Zero();
-    bool is_clipped = false;  ///< this pixel or a neighbour: tells only "at least"
+    bool is_clipped = false;            ///< this pixel or a neighbour, into which it may have bled
+    std::array<bool, 3> is_at_least{};  ///< channels clipped in this very pixel
 };
 
 struct ObjectPixelOptions {

@@ -13,6 +13,13 @@ std::vector<ObjectClass> classes_of(const std::vector<ObjectEstimate>& objects) 
     return classes;
 }
 
+void force_diffuse(std::vector<ObjectEstimate>& objects) {
+    for (ObjectEstimate& object : objects) {
+        object.object_class = ObjectClass::Diffuse;
+        object.reason = "forced to diffuse";
+    }
+}
+
 /// The light cost, and the fitted cost of every object, as one figure.
 double total_error(const LightEstimate& light, const std::vector<ObjectEstimate>& objects) {
     double sum = light.error_refined;
@@ -49,15 +56,16 @@ bool SceneEstimate::is_complete() const {
 
 SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
                              const EstimateOptions& options, const Progress& progress) {
+    if (options.method != EstimateMethod::Default) {
+        SceneEstimate published = estimate_published(scene, capture, options, progress);
+        if (options.lambertian) force_diffuse(published.objects);
+        return published;
+    }
     SceneEstimate result;
-    LightOptions light_options = options.lights;
-    light_options.seed = options.seed;
-    if (!light_options.reference_albedo) light_options.reference_albedo = capture.reference_albedo;
-    if (!options.overrides.lights.empty()) light_options.known_lights = options.overrides.lights;
-
     Timer timer;
-    result.light = estimate_lights(scene, capture.frames, capture.saturation_level, light_options,
-                                   progress.part(0.0, 0.4));
+    result.light = options.first_light
+                       ? *options.first_light
+                       : estimate_first_light(scene, capture, options, progress.part(0.0, 0.4));
     result.seconds.emplace_back("light", timer.seconds());
     if (result.light.lights.empty()) return result;
 
@@ -71,7 +79,7 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
 
     if (options.refine_jointly && !result.objects.empty()) {
         timer = Timer();
-        LightOptions again = light_options;
+        LightOptions again = first_light_options(capture, options);
         again.object_classes = classes_of(result.objects);
         std::vector<DiscLight> start;
         for (const FittedLight& fitted : result.light.lights) start.push_back(fitted.light);
@@ -86,11 +94,7 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
         result.error_joint = total_error(result.light, result.objects);
         result.seconds.emplace_back("joint", timer.seconds());
     }
-    if (options.lambertian)
-        for (ObjectEstimate& object : result.objects) {
-            object.object_class = ObjectClass::Diffuse;
-            object.reason = "forced to diffuse";
-        }
+    if (options.lambertian) force_diffuse(result.objects);
     progress.update(1.0);
     return result;
 }

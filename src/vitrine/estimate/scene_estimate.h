@@ -4,7 +4,9 @@
 
 #include "estimate/lights.h"
 #include "estimate/materials.h"
+#include "estimate/paper_method.h"
 
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -18,16 +20,32 @@ struct Overrides {
     std::vector<Light> lights;  ///< geometry kept; strength still fitted
 };
 
+enum class EstimateMethod {
+    Default,
+    Paper,          ///< the published joint optimisation (estimate/paper_method.h)
+    Local,          ///< baseline without shadows or bounces, everything diffuse
+    InversePhoton,  ///< baseline of inverse photon mapping, everything diffuse
+};
+
+/// "default", "paper", "local", "inverse-photon", as on the command line.
+std::string method_name(EstimateMethod method);
+/// @throws InternalError for another word.
+EstimateMethod method_from_name(const std::string& name);
+
 struct EstimateOptions {
+    EstimateMethod method = EstimateMethod::Default;
+    PaperOptions paper;  ///< of the methods other than the default
     LightOptions lights;
     MaterialOptions materials;
     Overrides overrides;
-    bool lambertian = false;     ///< every class forced to diffuse: the baseline
+    std::optional<LightEstimate> first_light;  ///< go on from here instead of searching
+    bool lambertian = false;                   ///< every class forced to diffuse: the baseline
     bool refine_jointly = true;  ///< second round: classes known, highlights pull the light
     std::uint64_t seed = 0;
 };
 
 struct SceneEstimate {
+    EstimateMethod method = EstimateMethod::Default;
     LightEstimate light;
     std::vector<ObjectEstimate> objects;
     double error_initial = 0.0;  ///< robust photometric cost with the first light
@@ -45,6 +63,17 @@ struct SceneEstimate {
 /// Costs about 15 s for 14 views of 640x360 on two cores.
 SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
                              const EstimateOptions& options = {}, const Progress& progress = {});
+
+/// Light options with what the capture and the user know filled in.
+LightOptions first_light_options(const Capture& capture, const EstimateOptions& options);
+
+/// The light alone, by the method chosen: what `estimate_scene` starts from.
+LightEstimate estimate_first_light(const Scene& scene, const Capture& capture,
+                                   const EstimateOptions& options, const Progress& progress = {});
+
+/// `estimate_scene` for the methods other than the default.
+SceneEstimate estimate_published(const Scene& scene, const Capture& capture,
+                                 const EstimateOptions& options, const Progress& progress = {});
 
 /// The scene with lights, ambient and materials set and the scan's vertex colours turned from
 /// radiance into albedo: radiance over irradiance, with shadows, bounced light and caustics taken

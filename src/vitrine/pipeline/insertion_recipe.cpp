@@ -172,24 +172,34 @@ class InsertionRun {
 
     EstimateOptions estimate_options() const {
         EstimateOptions estimate;
+        estimate.method = options_.method;
+        estimate.paper = options_.paper;
+        estimate.materials.specular.is_certified = options_.certificate;
         estimate.lambertian = options_.lambertian;
         estimate.seed = options_.seed;
         if (!options_.overrides.empty()) estimate.overrides = read_overrides(options_.overrides);
         return estimate;
     }
 
+    /// Photon counts only matter to the methods that use them.
+    std::string method_identity() const {
+        std::string identity = method_name(options_.method);
+        if (options_.method != EstimateMethod::Default)
+            identity += fmt::format(" {} {}", options_.paper.lights.photon_count,
+                                    options_.paper.caustic_photon_count);
+        return identity;
+    }
+
     void lights() {
         identity_ = workspace_.run_stage(
-            "lights", {identity_, hash_if_given(options_.overrides), std::to_string(options_.seed)},
+            "lights",
+            {identity_, hash_if_given(options_.overrides), std::to_string(options_.seed),
+             method_identity()},
             [&] {
-                EstimateOptions estimate = estimate_options();
-                LightOptions light = estimate.lights;
-                light.reference_albedo = capture_.reference_albedo;
-                light.known_lights = estimate.overrides.lights;
-                light.seed = options_.seed;
                 SceneEstimate first;
-                first.light = estimate_lights(scene(), capture_.frames, capture_.saturation_level,
-                                              light, progress_("lights"));
+                first.light = estimate_first_light(scene(), capture_, estimate_options(),
+                                                   progress_("lights"));
+                first.method = options_.method;
                 write_estimate(workspace_.path("30_lights.json"), first);
             },
             [] { return std::vector<std::string>{"30_lights.json"}; });
@@ -213,6 +223,7 @@ class InsertionRun {
         TransparentOptions& glass = options.materials.transparent;
         if (step.local.empty()) {
             glass.ior_step = step.value;
+            options.paper.ior_step = step.value;
         } else {
             glass.ior_grid = ior_samples(step, glass.ior_min, glass.ior_max);
         }
@@ -221,17 +232,13 @@ class InsertionRun {
     void materials() {
         identity_ = workspace_.run_stage(
             "materials",
-            {identity_, options_.lambertian ? "lambertian" : "full", options_.ior_step,
+            {identity_, options_.lambertian ? "lambertian" : "full",
+             options_.certificate ? "certified" : "fast", options_.ior_step,
              options_.ior_step.empty() ? "none" : hash_if_given(options_.ior_step)},
             [&] {
                 EstimateOptions options = estimate_options();
                 set_ior_step(options);
-                std::vector<DiscLight> start;
-                for (const FittedLight& fitted :
-                     read_estimate(workspace_.path("30_lights.json")).light.lights) {
-                    start.push_back(fitted.light);
-                }
-                options.lights.start = start;
+                options.first_light = read_estimate(workspace_.path("30_lights.json")).light;
                 SceneEstimate estimate =
                     estimate_scene(scene(), capture_, options, progress_("materials"));
                 for (ObjectEstimate& object : estimate.objects) {

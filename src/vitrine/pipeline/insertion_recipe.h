@@ -2,6 +2,7 @@
 #pragma once
 
 #include "base/progress.h"
+#include "estimate/scene_estimate.h"
 #include "pipeline/placement.h"
 #include "pipeline/workspace.h"
 #include "reconstruct/scan.h"
@@ -20,6 +21,9 @@ enum class RenderQuality {
 
 struct InsertionRunOptions {
     PoseMode poses = PoseMode::Refine;
+    EstimateMethod method = EstimateMethod::Default;
+    PaperOptions paper;               ///< of the published methods: photon counts
+    bool certificate = false;         ///< prove each Ward fit by branch and bound
     bool lambertian = false;          ///< every object diffuse: the baseline of the papers
     std::filesystem::path geometry;   ///< folder of PLY meshes that replace the hulls they overlap
     std::filesystem::path overrides;  ///< JSON of what the user knows

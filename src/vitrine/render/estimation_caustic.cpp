@@ -83,7 +83,8 @@ BeamArrival CausticBeam::arrive(const Entry& entry, float ior, const Rgb& sigma_
     arrival.position = hit_point(scene_.mesh(hit.part), hit);
     arrival.direction = path.exit_direction;
     arrival.normal = hit.normal;
-    arrival.power = (-sigma_a * path.length_m).exp() * path.transmittance * entry.power;
+    const float passed = options_.has_fresnel ? path.transmittance : 1.0f;
+    arrival.power = (-sigma_a * path.length_m).exp() * passed * entry.power;
     return arrival;
 }
 
@@ -96,7 +97,10 @@ std::vector<BeamArrival> CausticBeam::arrivals(double ior, const Rgb& sigma_a_pe
         BeamArrival* out = &arrivals[i * ways];
         if (!options_.is_shell) {
             *out = entry.mirrored;
-            out->power *= fresnel_dielectric(-entry.entry.normal.dot(entry.entry.direction), eta);
+            out->power *=
+                options_.has_fresnel
+                    ? fresnel_dielectric(-entry.entry.normal.dot(entry.entry.direction), eta)
+                    : 0.0f;
             ++out;
         }
         const int exits = options_.is_shell ? 1 : options_.max_exits;

@@ -15,6 +15,8 @@ struct CausticBeamOptions {
                             ///< are reflected inside before; each costs as much as the first
     bool is_shell = false;  ///< thin-walled: straight through
     double wall_m = 0.0025;  ///< of a shell
+    bool has_fresnel =
+        true;  ///< false: neither loss nor reflection at the surfaces, as in the paper
 };
 
 /// A photon that arrived on the scan.
