@@ -7,7 +7,6 @@
 #include "estimate/scene_estimate.h"
 #include "image/colour.h"
 #include "image/image_io.h"
-#include "reconstruct/labelled_scene.h"
 #include "truth_scene.h"
 
 #include <cstdio>
@@ -81,17 +80,6 @@ void print_object(const TrueObject& truth, const ObjectEstimate& object) {
         }
 }
 
-/// Reconstructed geometry, kept under `cache` for the next run.
-Scene reconstructed(const Capture& capture, const std::filesystem::path& cache) {
-    const std::filesystem::path file = cache / capture.name / "scene.json";
-    if (std::filesystem::exists(file)) return read_scene(file);
-    const Scan scan = make_scan(capture);
-    const Scene scene = build_scene(scan, find_candidates(capture, scan));
-    std::filesystem::create_directories(file.parent_path());
-    write_scene(file, scene);
-    return scene;
-}
-
 const TrueObject* nearest_object(const TrueScene& truth, const Mesh& hull) {
     const Vec3 centre = bounds(hull).centre();
     const TrueObject* nearest = nullptr;
@@ -138,8 +126,8 @@ int main(int argc, char** argv) {
                     cache.empty() ? "true" : "reconstructed");
         const Capture capture = read_capture(folder);
         const TrueScene truth = read_truth(folder);
-        const Scene scene =
-            cache.empty() ? make_true_geometry(folder, capture) : reconstructed(capture, cache);
+        const Scene scene = cache.empty() ? make_true_geometry(folder, capture)
+                                          : cached_reconstruction(capture, cache);
         Timer timer;
         const SceneEstimate estimate = estimate_scene(scene, capture);
         std::printf("estimation %.1f s:", timer.seconds());

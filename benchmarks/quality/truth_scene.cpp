@@ -4,6 +4,9 @@
 #include "base/parallel.h"
 #include "estimate/observations.h"
 #include "geometry/mesh_io.h"
+#include "reconstruct/labelled_scene.h"
+#include "reconstruct/scan.h"
+#include "scene/scene_json.h"
 
 #include <fstream>
 #include <map>
@@ -155,6 +158,16 @@ Scene make_true_geometry(const std::filesystem::path& folder, const Capture& cap
     }
     fill_unseen(scan, is_known);
     scene.parts[0].mesh = std::make_shared<const Mesh>(std::move(scan));
+    return scene;
+}
+
+Scene cached_reconstruction(const Capture& capture, const std::filesystem::path& cache) {
+    const std::filesystem::path file = cache / capture.name / "scene.json";
+    if (std::filesystem::exists(file)) return read_scene(file);
+    const Scan scan = make_scan(capture);
+    const Scene scene = build_scene(scan, find_candidates(capture, scan));
+    std::filesystem::create_directories(file.parent_path());
+    write_scene(file, scene);
     return scene;
 }
 

@@ -34,4 +34,7 @@ TrueScene read_truth(const std::filesystem::path& capture_folder);
 /// "scan" with observed radiance at the vertices, glass and metal as "object_k".
 Scene make_true_geometry(const std::filesystem::path& capture_folder, const Capture& capture);
 
+/// Reconstructed geometry with found candidates, kept under `cache` for the next run.
+Scene cached_reconstruction(const Capture& capture, const std::filesystem::path& cache);
+
 }  // namespace vitrine

@@ -249,6 +249,32 @@ Mesh shell_of(const Mesh& hull, double wall_m) {
     return shell;
 }
 
+/// Leaves part `p` with the first paint and appends a part for each of the others.
+void split_paints(Scene& scene, std::size_t p, const ObjectEstimate& object) {
+    Mesh mesh = *scene.parts[p].mesh;
+    if (mesh.normals.empty()) mesh.normals = vertex_normals(mesh);
+    std::vector<int> paint;
+    for (const Triangle& t : mesh.triangles)
+        paint.push_back(object.paints.at(
+            (mesh.vertices[at(t[0])] + mesh.vertices[at(t[1])] + mesh.vertices[at(t[2])]) / 3.0f));
+    for (std::size_t k = 0; k < object.clusters.size(); ++k) {
+        std::vector<bool> is_own;
+        for (const int label : paint) is_own.push_back(label == static_cast<int>(k));
+        Mesh piece = with_triangles(mesh, is_own);
+        if (k > 0 && piece.empty()) continue;
+        Part part = scene.parts[p];
+        part.mesh = std::make_shared<const Mesh>(std::move(piece));
+        part.material = object.clusters[k].fit.ward;
+        if (k == 0) {
+            scene.parts[p] = part;
+        } else {
+            part.name += "_paint_" + std::to_string(k);
+            part.mesh_file.clear();
+            scene.parts.push_back(part);
+        }
+    }
+}
+
 }  // namespace
 
 Scene apply(const Scene& scene, const SceneEstimate& estimate, const Progress& progress) {
@@ -259,7 +285,7 @@ Scene apply(const Scene& scene, const SceneEstimate& estimate, const Progress& p
     for (std::size_t p = 0; p < scene.parts.size(); ++p) {
         progress.update(static_cast<double>(p) / static_cast<double>(scene.parts.size()),
                         "albedo of the scan");
-        Part& part = result.parts[p];
+        Part& part = result.parts[p];  // gone once paints are split
         const int k = world.object_of_part(static_cast<int>(p));
         if (k < 0) {
             if (part.mesh->colours.empty() || estimate.light.lights.empty()) continue;
@@ -278,6 +304,7 @@ Scene apply(const Scene& scene, const SceneEstimate& estimate, const Progress& p
                 part.mesh = std::make_shared<const Mesh>(shell_of(*part.mesh, object.wall_m));
         } else if (c == ObjectClass::Specular && !object.clusters.empty()) {
             part.material = object.clusters.front().fit.ward;
+            if (object.clusters.size() > 1) split_paints(result, p, object);
         } else {
             Diffuse diffuse;
             diffuse.albedo = object.albedo;

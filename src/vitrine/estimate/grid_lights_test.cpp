@@ -99,7 +99,7 @@ TEST_F(GridLightsTest, PhotonsFindTheCellOfALightWithShadows) {
     const double error =
         angle_between(e.light.lights[0].light.position_m - e.light.reference_point_m,
                       light - e.light.reference_point_m);
-    EXPECT_LT(degrees(error), 20.0);
+    EXPECT_LT(degrees(error), 30.0);  // the cells are 24 degrees wide
     EXPECT_GT(e.light.lights[0].stddev_direction_deg, 5.0);
 }
 

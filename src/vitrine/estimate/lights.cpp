@@ -161,8 +161,10 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
         set = refine_lights(fit, from_lights(known, samples.reference_point),
                             {.max_evaluations = 60, .keep_geometry = true});
     } else if (options.start && !options.start->empty()) {
-        set = refine_lights(fit, from_lights(*options.start, samples.reference_point),
-                            {.max_evaluations = 160, .step_rad = 0.03});
+        const RefineOptions refine =
+            options.keep_start ? RefineOptions{.max_evaluations = 60, .keep_geometry = true}
+                               : RefineOptions{.max_evaluations = 160, .step_rad = 0.03};
+        set = refine_lights(fit, from_lights(*options.start, samples.reference_point), refine);
     } else {
         set = find_lights(fit, options, estimate, progress);
     }

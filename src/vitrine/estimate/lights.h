@@ -22,6 +22,8 @@ struct LightOptions {
     std::vector<ObjectClass> object_classes;  ///< what is known of each candidate; empty: nothing
     std::vector<Light> known_lights;          ///< from the user: geometry kept, strength fitted
     std::optional<std::vector<DiscLight>> start;  ///< refine from here instead of searching
+    bool keep_start =
+        false;  ///< lights of `start` stay where they are: only their strength is fitted
     std::uint64_t seed = 0;
 };
 

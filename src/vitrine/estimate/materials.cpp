@@ -17,7 +17,7 @@ constexpr int kMinPixels = 60;
 double log_ratio(double a, double b) { return std::log(std::max(a, 1e-4) / std::max(b, 1e-4)); }
 
 /// Class by cost; fills margin and reason.
-ObjectClass classify(ObjectEstimate& object, const WardFit& ward, double unsure_margin) {
+ObjectClass classify(ObjectEstimate& object, double unsure_margin) {
     const double clear = std::min(object.cost_solid, object.cost_shell);
     object.class_margin = log_ratio(object.cost_ward, clear);
     if (std::abs(object.class_margin) < unsure_margin) {
@@ -25,7 +25,7 @@ ObjectClass classify(ObjectEstimate& object, const WardFit& ward, double unsure_
         return ObjectClass::Unsure;
     }
     if (object.class_margin > 0.0) return ObjectClass::Transparent;
-    if (log_ratio(ward.cost_diffuse, ward.cost) < kLobeGain) return ObjectClass::Diffuse;
+    if (log_ratio(object.cost_diffuse, object.cost_ward) < kLobeGain) return ObjectClass::Diffuse;
     return ObjectClass::Specular;
 }
 
@@ -71,14 +71,15 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         }
         const TransparentFit solid = fit_solid(world, lookup, k, pixels, bright, transparent);
         const TransparentFit shell = fit_shell(world, lookup, k, pixels, bright, transparent);
-        const SpecularModel model(world, pixels, context.light_on(k), options.specular);
-        const WardFit ward = fit_ward(model, bright, options.specular);
+        const ClusteredWard metal =
+            fit_ward_clusters(world, pixels, context.light_on(k), bright, options.specular);
+        const WardFit& ward = metal.whole;
         object.cost_solid = solid.cost;
         object.cost_shell = shell.cost;
-        object.cost_ward = ward.cost;
-        object.cost_diffuse = ward.cost_diffuse;
+        object.cost_ward = metal.cost;
+        object.cost_diffuse = metal.cost_diffuse;
         object.class_margin = 0.0;
-        object.object_class = classify(object, ward, options.unsure_margin);
+        object.object_class = classify(object, options.unsure_margin);
         log_debug(
             "{}: {} pixels, costs solid {:.4f} (n {:.3f}, seen {:.2f}) shell {:.4f} (seen {:.2f}) "
             "ward {:.4f} (sigma {:.3f}, lobe {:.2f}) diffuse {:.4f}",
@@ -92,7 +93,8 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         object.sigma_a_per_m = clear.sigma_a_per_m;
         object.is_hollow = clear.is_shell;
         object.wall_m = clear.wall_m;
-        object.clusters = {{1.0, ward}};
+        object.clusters = metal.clusters;
+        object.paints = metal.paints;
         object.albedo = ward.albedo;
         objects.push_back(object);
     }
@@ -113,12 +115,14 @@ void refit_specular(const Scene& scene, std::span<const RgbdFrame> frames, doubl
         if (object.object_class == ObjectClass::Transparent) continue;
         const std::vector<ObjectPixel> pixels = object_pixels(world, lookup, k, options.pixels);
         if (static_cast<int>(pixels.size()) < kMinPixels) continue;
-        const SpecularModel model(world, pixels, context.light_on(k), options.specular);
-        const WardFit ward = fit_ward(model, bright, options.specular);
-        object.cost_ward = ward.cost;
-        object.cost_diffuse = ward.cost_diffuse;
+        const ClusteredWard metal =
+            fit_ward_clusters(world, pixels, context.light_on(k), bright, options.specular);
+        const WardFit& ward = metal.whole;
+        object.cost_ward = metal.cost;
+        object.cost_diffuse = metal.cost_diffuse;
         object.albedo = ward.albedo;
-        object.clusters = {{1.0, ward}};
+        object.clusters = metal.clusters;
+        object.paints = metal.paints;
     }
 }
 

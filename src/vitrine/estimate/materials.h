@@ -5,6 +5,7 @@
 #include "estimate/lights.h"
 #include "estimate/specular.h"
 #include "estimate/transparent.h"
+#include "estimate/ward_clusters.h"
 
 #include <optional>
 #include <string>
@@ -32,11 +33,6 @@ struct ObjectOverride {
 const ObjectOverride* find_override(const std::vector<ObjectOverride>& overrides,
                                     const std::string& id);
 
-struct WardCluster {
-    double area_fraction = 1.0;
-    WardFit fit;
-};
-
 struct ObjectEstimate {
     std::string id;
     ObjectClass object_class = ObjectClass::Unsure;
@@ -47,6 +43,7 @@ struct ObjectEstimate {
     Estimate<double> ior;               ///< transparent only
     Estimate<Rgb> sigma_a_per_m;        ///< transparent only
     std::vector<WardCluster> clusters;  ///< specular only
+    AlbedoClusters paints;              ///< where each cluster lies; not in estimate.json
     Rgb albedo = Rgb::Constant(0.5f);   ///< best single albedo: what a diffuse world makes of it
     double cost_solid = 1.0, cost_shell = 1.0, cost_ward = 1.0, cost_diffuse = 1.0;
     std::string reason;

@@ -88,7 +88,9 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
                                                 again, progress.part(0.7, 0.85));
         refined.error_initial = result.light.error_initial;
         refined.grid_direction = result.light.grid_direction;
-        result.light = refined;
+        result.light = refine_light_jointly(scene, capture.frames, capture.saturation_level,
+                                            refined, result.objects, again, options.materials,
+                                            options.joint, &result.joint);
         refit_specular(scene, capture.frames, capture.saturation_level, result.light,
                        options.materials, result.objects, progress.part(0.85, 1.0));
         result.error_joint = total_error(result.light, result.objects);

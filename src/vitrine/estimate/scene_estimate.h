@@ -2,6 +2,7 @@
 // make.
 #pragma once
 
+#include "estimate/joint_light.h"
 #include "estimate/lights.h"
 #include "estimate/materials.h"
 #include "estimate/paper_method.h"
@@ -37,6 +38,7 @@ struct EstimateOptions {
     PaperOptions paper;  ///< of the methods other than the default
     LightOptions lights;
     MaterialOptions materials;
+    JointOptions joint;
     Overrides overrides;
     std::optional<LightEstimate> first_light;  ///< go on from here instead of searching
     bool lambertian = false;                   ///< every class forced to diffuse: the baseline
@@ -50,6 +52,7 @@ struct SceneEstimate {
     std::vector<ObjectEstimate> objects;
     double error_initial = 0.0;  ///< robust photometric cost with the first light
     double error_joint = 0.0;    ///< with the final light and materials
+    JointReport joint;           ///< what highlights changed; zeros when they were not asked
     std::vector<std::pair<std::string, double>> seconds;  ///< by part; not written to estimate.json
 
     /// True when every quantity converged: otherwise the program ends with exit code 4.

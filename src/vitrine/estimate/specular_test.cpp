@@ -1,6 +1,5 @@
-#include "estimate/specular.h"
-
 #include "base/rng.h"
+#include "estimate/ward_clusters.h"
 #include "geometry/primitives.h"
 
 #include <gtest/gtest.h>
@@ -158,6 +157,32 @@ TEST_F(SpecularTest, CertificateAgreesWithTheFastSearch) {
     EXPECT_NEAR(fitted.certificate->sigma, fitted.sigma.value, 0.01 * fitted.sigma.value);
     EXPECT_GT(fitted.certificate->nodes, 1);
     EXPECT_LE(fitted.certificate->lower_bound, fitted.certificate->upper_bound);
+}
+
+TEST_F(SpecularTest, TwoPaintsShareWhatOneCannotTell) {
+    Ward red = bronze(0.12, 0.12), green = red;
+    red.rho_d = Rgb(0.4f, 0.05f, 0.05f);
+    green.rho_d = Rgb(0.05f, 0.3f, 0.08f);
+    shade(red, 0.01f);
+    std::vector<ObjectPixel> upper = pixels_;
+    shade(green, 0.01f);
+    for (std::size_t i = 0; i < pixels_.size(); ++i)
+        if (pixels_[i].surface.position.z() > 0.06f) pixels_[i] = upper[i];
+    const EstimationScene world(scene_);
+    const ClusteredWard fitted = fit_ward_clusters(world, pixels_, light_, 0.3, options_);
+    ASSERT_EQ(fitted.clusters.size(), 2u);
+    EXPECT_EQ(fitted.paints.count, 2);
+    const auto at_top = static_cast<std::size_t>(fitted.paints.at(Vec3f(0, 0, 0.1f)));
+    const WardFit& top = fitted.clusters[at_top].fit;
+    const WardFit& bottom = fitted.clusters[1 - at_top].fit;
+    EXPECT_NEAR(top.ward.rho_d[0], 0.4, 0.05);
+    EXPECT_NEAR(bottom.ward.rho_d[1], 0.3, 0.05);
+    EXPECT_NEAR(top.sigma.value, 0.12, 0.02);
+    EXPECT_NEAR(bottom.sigma.value, 0.12, 0.02);
+    EXPECT_NEAR(fitted.clusters[0].area_fraction + fitted.clusters[1].area_fraction, 1.0, 1e-9);
+
+    shade(red, 0.01f);
+    EXPECT_EQ(fit_ward_clusters(world, pixels_, light_, 0.3, options_).clusters.size(), 1u);
 }
 
 TEST_F(SpecularTest, PaintHasNoLobe) {

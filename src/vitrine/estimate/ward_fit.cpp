@@ -1,6 +1,7 @@
 // The fit of a Ward surface to the pixels of a SpecularModel.
 #include "base/log.h"
 #include "base/rng.h"
+#include "estimate/light_combinations.h"
 #include "estimate/specular.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
@@ -20,8 +21,8 @@ constexpr int kBootstrapRounds = 24;
 // Two roughnesses instead of one must lower the objective by this share and differ by this factor.
 constexpr double kBrushedGain = 0.1;
 constexpr double kMinBrushedRatio = 1.25;
-constexpr double kBrushedProbe = 1.35;  // factor of the first look at two roughnesses
-constexpr double kBrushedHint = 0.02;   // share it must win for a search to be worth its time
+constexpr double kBrushedProbe = 1.5;  // factor of the first look at two roughnesses
+constexpr double kBrushedHint = 0.02;  // share it must win for a search to be worth its time
 constexpr double kSqrt2 = 1.41421356237;
 
 enum class Use : std::uint8_t { None, Equal, AtLeast };
@@ -72,15 +73,22 @@ Search search_brushed(const SpecularModel& model, double bright, const SpecularO
                         bright, true)
             .objective;
     };
-    const double centre = std::log(isotropic.lobe.sigma_x), step = std::log(kBrushedProbe);
-    const double wide_x = objective(centre + step, centre - step);
-    const double wide_y = objective(centre - step, centre + step);
-    if (std::min(wide_x, wide_y) > (1.0 - kBrushedHint) * isotropic.objective) return isotropic;
-    const double sign = wide_x < wide_y ? 1.0 : -1.0;
-    const MinimumNd best =
-        minimise_nelder_mead([&](const std::vector<double>& x) { return objective(x[0], x[1]); },
-                             {centre + sign * step, centre - sign * step}, {0.3, 0.3},
-                             {.max_evaluations = 50, .tolerance = 1e-4, .min_size = 0.02});
+    // One roughness for a brushed surface may be anywhere: look around it and at three others.
+    const double step = std::log(kBrushedProbe);
+    double least = 2.0;
+    std::vector<double> start = {0.0, 0.0};
+    for (const double sigma : {isotropic.lobe.sigma_x, 0.06, 0.12, 0.24})
+        for (const double side : {-step, step}) {
+            const std::vector<double> probe = {std::log(sigma) + side, std::log(sigma) - side};
+            const double value = objective(probe[0], probe[1]);
+            if (value >= least) continue;
+            least = value;
+            start = probe;
+        }
+    if (least > (1.0 - kBrushedHint) * isotropic.objective) return isotropic;
+    const MinimumNd best = minimise_nelder_mead(
+        [&](const std::vector<double>& x) { return objective(x[0], x[1]); }, start, {0.3, 0.3},
+        {.max_evaluations = 50, .tolerance = 1e-4, .min_size = 0.02});
     const double x = std::exp(best.x[0]), y = std::exp(best.x[1]);
     if (best.value > (1.0 - kBrushedGain) * isotropic.objective ||
         std::max(x / y, y / x) < kMinBrushedRatio)
@@ -222,9 +230,8 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     for (const ObjectPixel& p : model.pixels())
         fit.censored_count += p.is_at_least[0] || p.is_at_least[1] || p.is_at_least[2];
     const Search isotropic = search_isotropic(model, bright, options);
-    const Search found = options.may_be_brushed && !isotropic.is_at_bound
-                             ? search_brushed(model, bright, options, isotropic)
-                             : isotropic;
+    const Search found =
+        options.may_be_brushed ? search_brushed(model, bright, options, isotropic) : isotropic;
     fit.cost_isotropic = isotropic.objective;
     const SpecularColumns columns = model.columns(found.lobe);
     std::vector<Rgbd> weight;

@@ -1,0 +1,263 @@
+// Light errors of the default method, the published joint optimisation and its two baselines, on
+// captures of known truth and on worlds we make:
+//   vitrine_method_quality [--scan CACHE] [--worlds N] [--first SEED] [--light-photons N]
+//                          [--caustic-photons N] [CAPTURE...]
+// Where metal was found, also what its highlights add to the light (estimate/joint_light.h).
+// Photons of the full emission (8 million into the half space) are timed and extrapolated.
+#include "base/timer.h"
+#include "estimate/grid_lights.h"
+#include "estimate/scene_estimate.h"
+#include "math/statistics.h"
+#include "render/hemisphere_photons.h"
+#include "synthetic/world.h"
+#include "truth_scene.h"
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <map>
+
+using namespace vitrine;
+
+namespace {
+
+/// One scene with its truth.
+struct Case {
+    std::string name;
+    Scene scene;
+    Capture capture;
+    std::vector<DiscLight> lights;
+    Vec3 reference = Vec3::Zero();
+};
+
+struct Error {
+    double direction_deg = 0.0, elevation_deg = 0.0;
+};
+
+double elevation(const Vec3& d) { return degrees(std::asin(d.normalized().z())); }
+
+/// Mean over the true lights of the error of the nearest estimated one.
+Error error_of(const Case& c, const std::vector<Vec3>& positions) {
+    Error error;
+    for (const DiscLight& light : c.lights) {
+        const Vec3 t = light.position_m - c.reference;
+        Error least{180.0, 90.0};
+        for (const Vec3& position : positions) {
+            const Vec3 d = position - c.reference;
+            const double angle = degrees(angle_between(d, t));
+            if (angle < least.direction_deg) least = {angle, std::abs(elevation(d) - elevation(t))};
+        }
+        error.direction_deg += least.direction_deg / static_cast<double>(c.lights.size());
+        error.elevation_deg += least.elevation_deg / static_cast<double>(c.lights.size());
+    }
+    return error;
+}
+
+std::vector<Vec3> positions_of(const LightEstimate& light) {
+    std::vector<Vec3> positions;
+    for (const FittedLight& fitted : light.lights) positions.push_back(fitted.light.position_m);
+    return positions;
+}
+
+/// Wall and processor seconds.
+struct Clock {
+    Timer timer;
+    std::clock_t start = std::clock();
+    double wall() const { return timer.seconds(); }
+    double cpu() const {
+        return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
+    }
+};
+
+struct Table {
+    std::vector<std::string> order;
+    std::map<std::string, std::vector<double>> direction, elevation, wall, cpu;
+
+    void add(const std::string& row, const Error& error, double wall_s, double cpu_s) {
+        if (!direction.contains(row)) order.push_back(row);
+        direction[row].push_back(error.direction_deg);
+        elevation[row].push_back(error.elevation_deg);
+        wall[row].push_back(wall_s);
+        cpu[row].push_back(cpu_s);
+    }
+    void print(const std::string& title) const {
+        fmt::print("\n{}, {} scenes\n", title, direction.at(order[0]).size());
+        fmt::print(
+            "| method | direction, deg: mean +- sd | median | 90 % | elevation, deg: mean +- "
+            "sd | seconds, wall | processor |\n|---|---|---|---|---|---|---|\n");
+        for (const std::string& row : order) {
+            const auto& d = direction.at(row);
+            const auto& e = elevation.at(row);
+            fmt::print(
+                "| {} | {:.2f} +- {:.2f} | {:.2f} | {:.2f} | {:.2f} +- {:.2f} | {:.1f} | "
+                "{:.1f} |\n",
+                row, mean(d), d.size() > 1 ? standard_deviation(d) : 0.0, median(d),
+                quantile(d, 0.9), mean(e), e.size() > 1 ? standard_deviation(e) : 0.0,
+                mean(wall.at(row)), mean(cpu.at(row)));
+        }
+        if (!direction.contains("default")) return;
+        fmt::print("ours over the nearest grid light: {:.2f} (direction), {:.2f} (elevation)\n",
+                   mean(direction.at("default")) / mean(direction.at("nearest of the grid")),
+                   mean(elevation.at("default")) / mean(elevation.at("nearest of the grid")));
+    }
+};
+
+/// One scene by all methods. The paper's first step is the inverse-photon baseline: its photon maps
+/// are made once.
+SceneEstimate measure(const Case& c, const PaperOptions& paper, Table& table) {
+    EstimateOptions options;
+    options.paper = paper;
+    Clock clock;
+    const SceneEstimate ours = estimate_scene(c.scene, c.capture, options);
+    const double wall = clock.wall(), cpu = clock.cpu();
+    table.add("default", error_of(c, positions_of(ours.light)), wall, cpu);
+
+    const LightOptions light = first_light_options(c.capture, options);
+    const auto grid = [&](GridLightModel model, const std::string& row) {
+        GridLightOptions grid_options = paper.lights;
+        grid_options.model = model;
+        clock = Clock();
+        GridLightEstimate found = estimate_grid_lights(
+            c.scene, c.capture.frames, c.capture.saturation_level, light, grid_options);
+        const double w = clock.wall(), p = clock.cpu();
+        table.add(row, error_of(c, positions_of(found.light)), w, p);
+        table.add(row + ", weighted mean",
+                  error_of(c, {found.light.reference_point_m + found.mean_direction}), w, p);
+        return std::pair(found, std::pair(w, p));
+    };
+    const auto [local, local_time] = grid(GridLightModel::Local, "local");
+    const auto [photon, photon_time] = grid(GridLightModel::Photons, "inverse-photon");
+
+    options.method = EstimateMethod::Paper;
+    options.first_light = photon.light;
+    clock = Clock();
+    const SceneEstimate published = estimate_scene(c.scene, c.capture, options);
+    table.add("paper", error_of(c, positions_of(published.light)), clock.wall() + photon_time.first,
+              clock.cpu() + photon_time.second);
+    table.add("nearest of the grid", error_of(c, local.positions_m), 0, 0);
+    table.add("best scored of the grid",
+              error_of(c, {ours.light.reference_point_m + ours.light.grid_direction}), 0, 0);
+
+    fmt::print("{}:", c.name);
+    for (const std::string& row : table.order)
+        fmt::print(" {} {:.2f}", row, table.direction.at(row).back());
+    for (const ObjectEstimate& o : published.objects)
+        fmt::print("; paper: {} {} (margin {:+.2f}) n {:.3f} sigma {:.3f}", o.id,
+                   class_name(o.object_class), o.class_margin, o.ior.value,
+                   o.clusters.empty() ? 0.0 : o.clusters.front().fit.sigma.value);
+    fmt::print("\n  default, seconds:");
+    for (const auto& [part, seconds] : ours.seconds) fmt::print(" {} {:.1f}", part, seconds);
+    fmt::print("; paper:");
+    for (const auto& [part, seconds] : published.seconds) fmt::print(" {} {:.1f}", part, seconds);
+    fmt::print("\n");
+    std::fflush(stdout);
+    return ours;
+}
+
+/// What highlights bring: the default's light moved by them, from the same start.
+void measure_joint(const Case& c, const SceneEstimate& ours, Table& table) {
+    LightOptions light = first_light_options(c.capture, {});
+    bool has_metal = false;
+    for (const ObjectEstimate& object : ours.objects) {
+        light.object_classes.push_back(object.object_class);
+        has_metal |= object.object_class == ObjectClass::Specular;
+    }
+    if (!has_metal) return;
+    fmt::print("  highlights:");
+    for (const auto& [mode, row] : {std::pair(JointMode::Separate, "shading and shadows"),
+                                    std::pair(JointMode::Likelihoods, "with highlights"),
+                                    std::pair(JointMode::HighlightsFirst, "highlights first")}) {
+        JointOptions options;
+        options.mode = mode;
+        JointReport report;
+        const Clock clock;
+        const LightEstimate moved =
+            refine_light_jointly(c.scene, c.capture.frames, c.capture.saturation_level, ours.light,
+                                 ours.objects, light, {}, options, &report);
+        const Error error = error_of(c, positions_of(moved));
+        table.add(row, error, clock.wall(), clock.cpu());
+        fmt::print(" {} {:.2f} deg (object cost {:.4f} to {:.4f})", row, error.direction_deg,
+                   report.object_cost_before, report.object_cost_after);
+    }
+    fmt::print("\n");
+    std::fflush(stdout);
+}
+
+/// What the paper's 8 million photons of one image cost when none is spared.
+void time_full_emission(const Case& c) {
+    constexpr int kPart = 1'000'000;
+    const EstimationScene world(c.scene);
+    HemispherePhotonOptions options;
+    options.photon_count = kPart;
+    const Clock clock;
+    const std::size_t hits =
+        trace_hemisphere_photons(world, c.lights[0].position_m, c.lights[0].normal, options).size();
+    const double seconds = clock.cpu();
+    fmt::print(
+        "full emission: {} photons, {} hits in {:.2f} processor seconds; 8 million for 9 "
+        "places and 81 indices: {:.1f} hours (extrapolated)\n",
+        kPart, hits, seconds, seconds * 8 * 9 * 81 / 3600);
+}
+
+Case read_case(const std::filesystem::path& folder, const std::filesystem::path& cache) {
+    Case c;
+    c.capture = read_capture(folder);
+    c.name = c.capture.name;
+    const TrueScene truth = read_truth(folder);
+    c.lights = truth.lights;
+    c.reference = truth.reference_point_m;
+    c.scene = cache.empty() ? make_true_geometry(folder, c.capture)
+                            : cached_reconstruction(c.capture, cache);
+    return c;
+}
+
+Case make_case(std::uint64_t seed) {
+    WorldOptions options;
+    options.seed = seed;
+    options.object = seed % 2 == 0 ? WorldObject::Glass : WorldObject::Metal;
+    World world = make_world(options);
+    return {world.capture.name, std::move(world.labelled), std::move(world.capture), world.lights,
+            Vec3::Zero()};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    std::filesystem::path cache;
+    PaperOptions paper;
+    std::uint64_t worlds = 0, first = 1000;
+    std::vector<std::filesystem::path> folders;
+    for (int i = 1; i < argc; ++i) {
+        const std::string word = argv[i];
+        const auto number = [&] { return std::atof(argv[++i]); };
+        if (word == "--scan") {
+            cache = argv[++i];
+        } else if (word == "--worlds") {
+            worlds = static_cast<std::uint64_t>(number());
+        } else if (word == "--first") {
+            first = static_cast<std::uint64_t>(number());
+        } else if (word == "--light-photons") {
+            paper.lights.photon_count = static_cast<int>(number());
+        } else if (word == "--caustic-photons") {
+            paper.caustic_photon_count = number();
+        } else {
+            folders.emplace_back(word);
+        }
+    }
+    Table captures, made, joint;
+    for (const std::filesystem::path& folder : folders) {
+        const Case c = read_case(folder, cache);
+        if (captures.order.empty()) time_full_emission(c);
+        measure_joint(c, measure(c, paper, captures), joint);
+    }
+    for (std::uint64_t k = 0; k < worlds; ++k) {
+        const Case c = make_case(first + k);
+        measure_joint(c, measure(c, paper, made), joint);
+    }
+    if (!captures.order.empty())
+        captures.print(cache.empty() ? "Captures, true geometry" : "Captures, reconstructed");
+    if (!made.order.empty()) made.print("Made worlds");
+    if (!joint.order.empty()) joint.print("Light and metal together, scenes with metal");
+}
