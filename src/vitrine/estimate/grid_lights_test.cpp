@@ -37,7 +37,7 @@ class GridLightsTest : public ::testing::Test {
         }
         options_.samples.count = 1500;
         options_.samples.gather_rays = 4;
-        photons_.photon_count = 60'000;
+        photons_.photon_count = 20'000;
     }
 
     void shade(const Vec3& light, double watt_per_sr, bool has_shadows) {

@@ -18,7 +18,7 @@ class SpecularTest : public ::testing::Test {
         add_part("scan", std::move(table));
         add_part("object_0", make_sphere(0.05, Vec3(0, 0, 0.05), 48));
         options_.disc_samples = 8;
-        options_.lobe_samples = 6;
+        options_.lobe_samples = 4;
         options_.sigma_grid = 12;
         light_.opaque_mask = kScanMask | object_mask(0);
         const Vec3 position(0.5, 0.2, 0.8);
@@ -40,13 +40,13 @@ class SpecularTest : public ::testing::Test {
         const Vec3f eye(0.6f * static_cast<float>(std::cos(angle)),
                         0.6f * static_cast<float>(std::sin(angle)), 0.5f);
         const Frame frame((Vec3f(0, 0, 0.05f) - eye).normalized());
-        for (int v = -9; v <= 9; ++v)
-            for (int u = -9; u <= 9; ++u) {
+        for (int v = -7; v <= 7; ++v)
+            for (int u = -7; u <= 7; ++u) {
                 ObjectPixel pixel;
                 pixel.frame = view;
                 pixel.eye = eye;
-                pixel.direction = (frame.normal + 0.007f * static_cast<float>(u) * frame.tangent +
-                                   0.007f * static_cast<float>(v) * frame.bitangent)
+                pixel.direction = (frame.normal + 0.009f * static_cast<float>(u) * frame.tangent +
+                                   0.009f * static_cast<float>(v) * frame.bitangent)
                                       .normalized();
                 const Hit hit = world.accel().closest({eye, pixel.direction});
                 if (!hit.is_hit() || hit.part != 1) continue;
