@@ -1,5 +1,6 @@
 #include "base/json_reader.h"
 #include "capture/check.h"
+#include "capture/read_capture.h"
 #include "command.h"
 #include "commands.h"
 
@@ -9,13 +10,18 @@ void add_check_command(CLI::App& root) {
     CLI::App* command =
         root.add_subcommand("check", "Say whether a capture can be used, and why not");
     auto folder = std::make_shared<std::string>();
-    command->add_option("capture", *folder, "Capture folder (TUM RGB-D layout)")
+    command
+        ->add_option("capture", *folder,
+                     "Capture folder: TUM RGB-D, Redwood, nerfstudio, COLMAP or Polycam raw")
         ->required()
         ->group("Input");
     const auto common = add_common_options(*command);
     on_run(*command, common, [=] {
+        const CaptureReader& reader = find_capture_reader(*folder);
         const Capture capture = read_capture(*folder, make_progress(*common, "check"));
-        const std::vector<Verdict> verdicts = check_capture(capture);
+        std::vector<Verdict> verdicts = check_capture(capture);
+        verdicts.insert(verdicts.begin(),
+                        {Severity::Good, fmt::format("layout of {}", reader.name)});
         static const char* const words[] = {"good", "note", "problem"};
         bool has_problem = false;
         Json list = Json::array();
