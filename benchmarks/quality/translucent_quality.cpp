@@ -116,7 +116,7 @@ struct Bins {
     }
 };
 
-constexpr std::size_t kPhotons = 300'000;
+constexpr std::size_t kPhotons = 60'000;
 
 void compare_sphere(double radius_in_free_paths, const Rgb& albedo, double eta) {
     const double sigma_t = 1000, radius = radius_in_free_paths / sigma_t;
@@ -152,10 +152,10 @@ void compare_sphere(double radius_in_free_paths, const Rgb& albedo, double eta) 
 }
 
 void compare_slab(double thickness_in_free_paths, const Rgb& albedo, double eta) {
-    const double sigma_t = 1000, side = 60 * thickness_in_free_paths / sigma_t;
+    const double sigma_t = 1000, side = 25 * thickness_in_free_paths / sigma_t;
     const double thickness = thickness_in_free_paths / sigma_t;
-    // Light on the middle tenth alone: what leaves at the rim is nothing then.
-    const auto half = static_cast<float>(0.05 * side);
+    // Light on the middle fifth alone: what leaves at the rim is nothing then.
+    const auto half = static_cast<float>(0.1 * side);
     const Mesh mesh = make_box(Vec3(side, side, thickness));
     TranslucentBodyOptions options;
     options.max_samples = 200'000;
@@ -215,6 +215,9 @@ int run(int argc, char** argv) {
         std::printf("usage: vitrine_translucent_quality SCENE.json [PICTURE.png]\n");
         return 2;
     }
+    std::printf("picture of %s, 640 x 360, 16 paths per pixel:\n", argv[1]);
+    time_picture(argv[1], argc > 2 ? argv[2] : "");
+    std::fflush(stdout);
     compare_with_plain_sum();
     std::printf(
         "profile minus photons followed through the medium, %% of their flux, per channel:\n");
@@ -225,8 +228,6 @@ int run(int argc, char** argv) {
         compare_slab(4, albedo, eta);
         compare_slab(10, albedo, eta);
     }
-    std::printf("picture of %s, 640 x 360, 16 paths per pixel:\n", argv[1]);
-    time_picture(argv[1], argc > 2 ? argv[2] : "");
     return 0;
 }
 
