@@ -19,13 +19,13 @@ class Walker {
   public:
     Walker(const Accel& accel, const WalkMedium& medium) : accel_(accel), medium_(medium) {}
 
-    void walk(WalkPhoton photon, Rng& rng, std::vector<Departure>& departures) const {
+    void walk(const WalkPhoton& photon, Rng& rng, std::vector<Departure>& departures) const {
         const Hit entry = accel_.closest({photon.origin, photon.direction});
         if (!entry.is_hit()) return;
         Vec3f position = photon.origin + entry.distance * photon.direction;
         const float cosine = std::min(1.0f, -entry.normal.dot(photon.direction));
         float cos_t = 0;
-        photon.power *= 1 - fresnel_dielectric(cosine, medium_.eta, cos_t);
+        Rgb weight = Rgb::Constant(1 - fresnel_dielectric(cosine, medium_.eta, cos_t));
         Vec3f direction = refract(-photon.direction, entry.normal, medium_.eta, cos_t).normalized();
         while (true) {
             const float free =
@@ -33,9 +33,9 @@ class Walker {
             const Hit wall = accel_.closest({position, direction, kStart, free});
             if (!wall.is_hit()) {
                 position += free * direction;
-                photon.power *= medium_.albedo;
+                weight *= medium_.albedo;
                 direction = sample_uniform_sphere({rng.next_float(), rng.next_float()});
-                if (!survives(photon.power, rng)) return;
+                if (!survives(weight, rng)) return;
                 continue;
             }
             position += wall.distance * direction;
@@ -43,7 +43,7 @@ class Walker {
             const float f = fresnel_dielectric(std::min(1.0f, direction.dot(normal)),
                                                1.0f / medium_.eta, cos_t);
             if (rng.next_float() >= f) {
-                departures.push_back({position, photon.power});
+                departures.push_back({position, photon.power * weight});
                 return;
             }
             direction = (direction - 2 * direction.dot(normal) * normal).normalized();
@@ -52,12 +52,12 @@ class Walker {
     }
 
   private:
-    static bool survives(Rgb& power, Rng& rng) {
+    static bool survives(Rgb& weight, Rng& rng) {
         constexpr float kSure = 0.1f;
-        const float chance = power.maxCoeff() / kSure;
+        const float chance = weight.maxCoeff() / kSure;
         if (chance >= 1) return true;
         if (rng.next_float() >= chance) return false;
-        power /= chance;
+        weight /= chance;
         return true;
     }
 
