@@ -137,6 +137,20 @@ TEST(Trials, ReadsWhatRWritesAndSplitsParticipants) {
     ASSERT_EQ(read.size(), 2u);
     EXPECT_EQ(read[0].observer, "ann");
     EXPECT_EQ(read[1].trials.size(), 1u);
+    // The pair (3, 5) of the catch trial has more between it, and bob chose the other.
+    EXPECT_EQ(read[0].catch_count, 0);
+    EXPECT_EQ(read[1].catch_count, 1);
+    EXPECT_EQ(read[1].catch_failed, 1);
+}
+
+TEST(Trials, PracticeIsNeverAnalysed) {
+    const std::string header = "kind,resp,S1,S2,S3,S4\n";
+    const auto read =
+        parse_trials_csv(header + "practice,0,1,2,3,5\nmain,1,1,2,3,4\ncatch,1,1,2,3,5\n", "t.csv");
+    ASSERT_EQ(read.size(), 1u);
+    EXPECT_EQ(read[0].trials.size(), 1u);
+    EXPECT_EQ(read[0].catch_failed, 0);
+    EXPECT_THROW(parse_trials_csv(header + "practice,0,1,2,3,5\n", "t.csv"), InputError);
 }
 
 TEST(Trials, SaysWhereTheTextIsWrong) {
@@ -156,6 +170,7 @@ TEST(Trials, SaysWhereTheTextIsWrong) {
     EXPECT_EQ(where("resp,S1,S2,S3,S4\n1,1.5,2,3,4\n"), "t.csv:2");
     EXPECT_EQ(where("resp,S1,S2,S3,S4\n1,2,2,3,4\n"), "t.csv:2");
     EXPECT_EQ(where("resp,S1,S2,S3,S4\n1,1,2,3\n"), "t.csv:2");
+    EXPECT_EQ(where("kind,resp,S1,S2,S3,S4\nmian,1,1,2,3,4\n"), "t.csv:2");
     EXPECT_EQ(where("resp,S1,S2,S3,S4\n1,1,2,3,99999999999\n"), "t.csv:2");
 }
 

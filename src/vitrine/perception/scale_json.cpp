@@ -76,6 +76,7 @@ void add_analysis(Json& out, const ScaleAnalysis& a) {
                         {"replicates", a.bootstrap_replicates},
                         {"separated", a.separated_replicates}};
     out["diagnostics"] = to_json(a.diagnostics);
+    out["catch_trials"] = {{"asked", a.catch_count}, {"missed", a.catch_failed}};
 }
 
 double finite_or_infinite(const Json& value, const JsonObject& object, const std::string& key) {
@@ -182,6 +183,10 @@ ScaleAnalysis read_analysis(const JsonObject& object, std::size_t count) {
     a.separated_replicates = static_cast<int>(bootstrap.integer("separated"));
     bootstrap.finish();
     a.diagnostics = read_diagnostics(object.object("diagnostics"));
+    const JsonObject catches = object.object("catch_trials");
+    a.catch_count = static_cast<int>(catches.integer("asked"));
+    a.catch_failed = static_cast<int>(catches.integer("missed"));
+    catches.finish();
     const bool has_intervals = !a.psi_ci95.empty();
     if (has_intervals && a.psi_ci95.size() != count) {
         object.fail("ci95", std::to_string(count) + " intervals",
@@ -250,6 +255,7 @@ std::string series_to_json(const StimulusSeries& series) {
     root["integrator"] = series.integrator;
     root["exposure"] = series.exposure;
     root["noise_delta_l"] = series.noise_delta_l;
+    root["noise_delta_l_seen"] = series.noise_delta_l_seen;
     return root.dump(2) + "\n";
 }
 
@@ -280,6 +286,7 @@ StimulusSeries series_from_json(const std::string& text, const std::string& name
     series.integrator = root.text_or("integrator", "");
     series.exposure = root.number_or("exposure", 1.0);
     series.noise_delta_l = root.number_or("noise_delta_l", 0.0);
+    series.noise_delta_l_seen = root.number_or("noise_delta_l_seen", 0.0);
     root.finish();
     return series;
 }

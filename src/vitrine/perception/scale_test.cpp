@@ -354,7 +354,7 @@ TEST(Study, PoolsObserversAndSurvivesTheFile) {
         all.push_back({"observer " + std::to_string(o + 1),
                        answers(scale_with_threshold(kStimuli, 0.01), 40 + o)});
     }
-    all.push_back({"asleep", answers(std::vector<double>(10, 0.0), 99)});
+    all.push_back({"asleep", answers(std::vector<double>(10, 0.0), 99), 6, 3});
     StudyOptions options;
     options.bootstrap.replicates = 200;
     options.observer_replicates = 60;
@@ -365,6 +365,11 @@ TEST(Study, PoolsObserversAndSurvivesTheFile) {
     EXPECT_EQ(study.observers[3].scale.outcome, FitOutcome::NotIdentifiable);
     EXPECT_NEAR(study.lambda_geometric_mean, 0.010, 0.002);
     EXPECT_DOUBLE_EQ(study.mean_psi.back(), 1.0);
+    EXPECT_EQ(study.pooled.catch_failed, 3);
+    const auto& warnings = study.observers[3].scale.warnings;
+    EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(), [](const std::string& w) {
+        return w.find("missed 3 of 6 catch trials") != std::string::npos;
+    }));
     const std::string text = study_to_json(study);
     EXPECT_EQ(study_to_json(study_from_json(text, "scale.json")), text);
 }

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kDoubtfulP = 0.05;
 constexpr int kCurvePoints = 65;
+/// A coin misses half of the catch trials; who looks misses none.
+constexpr double kMaxFailedCatches = 0.2;
 
 void add_diagnostic_warnings(ScaleAnalysis& a) {
     auto& warnings = a.scale.warnings;
@@ -44,6 +46,16 @@ void add_direct_check(ScaleAnalysis& a, const QuestionCells& cells) {
     for (std::size_t i = 0; i < direct.psi.size(); ++i) {
         a.direct_psi_difference =
             std::max(a.direct_psi_difference, std::abs(direct.psi[i] - a.scale.psi[i]));
+    }
+}
+
+void add_catches(ScaleAnalysis& a, const Observations& observations) {
+    a.catch_count += observations.catch_count;
+    a.catch_failed += observations.catch_failed;
+    if (observations.catch_failed > kMaxFailedCatches * observations.catch_count) {
+        a.scale.warnings.push_back(fmt::format(
+            "{} missed {} of {} catch trials: these answers may not be about the pictures",
+            observations.observer, observations.catch_failed, observations.catch_count));
     }
 }
 
@@ -172,6 +184,7 @@ StudyAnalysis analyse_study(const std::vector<Observations>& observations,
     study.pooled =
         analyse(is_single ? observations[0].observer : "pooled", all, sessions, study.stimuli,
                 options, options.bootstrap.replicates, progress.part(0.0, share));
+    for (const Observations& o : observations) add_catches(study.pooled, o);
     if (is_single) return study;
     for (std::size_t o = 0; o < observations.size(); ++o) {
         const double at = share + (1 - share) * static_cast<double>(o) / by_observer.size();
@@ -179,6 +192,7 @@ StudyAnalysis analyse_study(const std::vector<Observations>& observations,
             observations[o].observer, by_observer[o], std::vector<int>(by_observer[o].size(), 0),
             study.stimuli, options, options.observer_replicates,
             progress.part(at, at + (1 - share) / by_observer.size())));
+        add_catches(study.observers.back(), observations[o]);
     }
     add_summary(study);
     return study;

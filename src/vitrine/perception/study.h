@@ -28,6 +28,7 @@ struct ScaleAnalysis {
     int bootstrap_replicates = 0;
     int separated_replicates = 0;
     ScaleDiagnostics diagnostics;
+    int catch_count = 0, catch_failed = 0;  ///< catch trials asked and missed
 };
 
 /// Do the observers share one scale? Likelihood ratio of separate scales against the pooled one.

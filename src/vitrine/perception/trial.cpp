@@ -100,6 +100,12 @@ Trial parse_row(const std::vector<std::string>& fields, const Columns& columns,
     return trial;
 }
 
+/// The pair with more ranks between its stimuli was said to be the less different one.
+bool is_failed_catch(const Trial& trial) {
+    const auto& r = trial.rank;
+    return (std::abs(r[3] - r[2]) > std::abs(r[1] - r[0])) != (trial.response == 1);
+}
+
 }  // namespace
 
 Trial canonical(const Trial& trial) {
@@ -138,18 +144,25 @@ std::vector<Observations> parse_trials_csv(const std::string& text, const std::s
             throw InputError({where, std::to_string(columns.count) + " fields",
                               std::to_string(fields.size()), ""});
         }
-        if (columns.at.count("kind") && fields[columns.at.at("kind")] != "main") continue;
+        const std::string kind = columns.at.count("kind") ? fields[columns.at.at("kind")] : "main";
+        if (kind == "practice") continue;
+        if (kind != "main" && kind != "catch") {
+            throw InputError({where, "kind main, catch or practice", "\"" + kind + "\"", ""});
+        }
         const std::string observer =
             columns.at.count("participant") ? fields[columns.at.at("participant")] : name;
         const Trial trial = parse_row(fields, columns, where);
-        const auto known = std::find_if(
-            all.begin(), all.end(), [&](const Observations& o) { return o.observer == observer; });
-        if (known == all.end()) {
-            all.push_back({observer, {trial}});
-        } else {
+        auto known = std::find_if(all.begin(), all.end(),
+                                  [&](const Observations& o) { return o.observer == observer; });
+        if (known == all.end()) known = all.insert(known, {observer, {}});
+        if (kind == "main") {
             known->trials.push_back(trial);
+        } else {
+            ++known->catch_count;
+            known->catch_failed += is_failed_catch(trial);
         }
     }
+    std::erase_if(all, [](const Observations& o) { return o.trials.empty(); });
     if (all.empty()) {
         throw InputError({name, "a header and at least one trial", "none", ""});
     }

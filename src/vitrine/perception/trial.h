@@ -22,7 +22,9 @@ struct Trial {
 /// The answers of one observer.
 struct Observations {
     std::string observer;
-    std::vector<Trial> trials;
+    std::vector<Trial> trials;  ///< main trials
+    int catch_count = 0;        ///< catch trials asked
+    int catch_failed = 0;       ///< of which the pair with less between its ranks was chosen
 };
 
 /// The same question with each pair in rising order and the lower pair first, the answer turned
@@ -31,7 +33,8 @@ Trial canonical(const Trial& trial);
 
 /// Reads trials from CSV text. The header names the columns; `resp`, `S1` .. `S4` are required in
 /// any order, `participant` splits the rows into observers (in order of first appearance), rows
-/// whose `kind` is not `main` are left out, the columns of the trial log are accepted and ignored.
+/// whose `kind` is `catch` are counted alone, `practice` is left out, the columns of the trial log
+/// are accepted and ignored.
 /// @param name for messages and as the observer's name where no participant is given
 /// @throws InputError with name:line for a bad header, a response other than 0 or 1, a rank below
 /// one, a pair of equal stimuli.

@@ -13,6 +13,7 @@ namespace {
 
 constexpr const char* kInk = "#2a7fb8";
 constexpr const char* kOther = "#b3541e";
+constexpr double kSameIndex = 1e-6;
 
 std::string number(double v, int digits = 4) {
     return std::isfinite(v) ? fmt::format("{:.{}g}", v, digits) : "none";
@@ -160,7 +161,7 @@ std::string summary_row(const ScaleAnalysis& a) {
         "<tr><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>"
         "<td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{:.2f}</td>"
         "<td class=\"number\">{:.2f}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>"
-        "<td class=\"number\">{}</td><td class=\"{}\">{}</td></tr>\n",
+        "<td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"{}\">{}</td></tr>\n",
         escape_html(a.name), s.trial_count, has_scale ? number(a.lambda.value) : "none",
         has_scale ? interval(a.lambda_ci95) : "none", number(s.sigma), s.log_likelihood, s.aic,
         has_scale && six.conditions ? fmt::format("{:.3f}", six.p_value) : "none",
@@ -168,6 +169,7 @@ std::string summary_row(const ScaleAnalysis& a) {
         has_scale ? fmt::format("{:.1f} % (p {:.2g})", 100 * a.diagnostics.lapses.lapse,
                                 a.diagnostics.lapses.p_value)
                   : "none",
+        a.catch_count ? fmt::format("{} of {}", a.catch_failed, a.catch_count) : "none",
         s.is_usable() ? "good" : "bad", outcome_name(s.outcome));
 }
 
@@ -186,6 +188,35 @@ std::string scale_table(const StudyAnalysis& study) {
             i + 1, study.stimuli[i], a.scale.psi[i], has_intervals ? interval(a.psi_ci95[i]) : "",
             a.scale.beta[i], a.scale.se_beta[i], has_intervals ? interval(a.beta_ci95[i]) : "",
             number(a.lambda.local[i][1]));
+    }
+    return text + "</table>\n";
+}
+
+/// What people saw beside what was computed from the pictures, at the stimuli.
+std::string comparison_section(const StudyAnalysis& study, const PredictedThreshold& prediction) {
+    const ScaleAnalysis& a = study.pooled;
+    std::string text =
+        "<h2>Measured and computed</h2>\n<p class=\"note\">The computed observer looks at the "
+        "pictures alone and was not measured with people: it compares two blurred pictures, "
+        "people answer about two pairs. A steady ratio says that it can plan a study; the ratio "
+        "itself is its criterion.</p>\n<table><tr><th>n</th><th>measured lambda</th><th>95 %</th>"
+        "<th>computed</th><th>computed / measured</th></tr>\n";
+    std::size_t rows = 0;
+    for (std::size_t i = 0; i < a.lambda.local.size(); ++i) {
+        const auto [n, measured] = a.lambda.local[i];
+        for (const auto& [m, computed] : prediction.local) {
+            if (std::abs(n - m) > kSameIndex) continue;
+            const double ratio = computed / measured;
+            text += fmt::format(
+                "<tr><td>{:.6g}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>"
+                "<td class=\"number\">{}</td><td class=\"number\">{}</td></tr>\n",
+                n, number(measured), i < a.local_ci95.size() ? interval(a.local_ci95[i]) : "",
+                number(computed), number(ratio, 3));
+            ++rows;
+        }
+    }
+    if (rows == 0) {
+        return "<p class=\"note\">The computed observer saw other indices than these.</p>\n";
     }
     return text + "</table>\n";
 }
@@ -209,7 +240,7 @@ std::string observers_section(const StudyAnalysis& study) {
     std::string text =
         "<h2>Observers</h2>\n<table><tr><th>observer</th><th>trials</th><th>lambda</th>"
         "<th>95 %</th><th>sigma</th><th>log-likelihood</th><th>AIC</th><th>six-point p</th>"
-        "<th>runs p</th><th>lapses</th><th>outcome</th></tr>\n";
+        "<th>runs p</th><th>lapses</th><th>catch trials missed</th><th>outcome</th></tr>\n";
     text += summary_row(study.pooled);
     for (const ScaleAnalysis& o : study.observers) text += summary_row(o);
     text += "</table>\n";
@@ -266,11 +297,7 @@ std::string mlds_report_html(const MldsReport& report) {
                                study.pooled.smooth_degrees_of_freedom == 1 ? "" : "s"));
     body += figure(lambda_plot(study, report.prediction),
                    "Lambda over the range, with its 95 % interval.");
-    if (report.prediction) {
-        body += fmt::format(
-            "<p class=\"note\">Computed observer, not measured with people: lambda {}.</p>\n",
-            number(report.prediction->value));
-    }
+    if (report.prediction) body += comparison_section(study, *report.prediction);
     body += observers_section(study);
     body += "<h2>Pooled scale</h2>\n" + scale_table(study);
     body += diagnostics_section(study.pooled);
