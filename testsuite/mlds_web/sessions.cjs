@@ -9,13 +9,14 @@ const { chromium } = require('playwright-core');
 
 const [program, work, browserPath, screenshots] = process.argv.slice(2);
 const study = path.join(work, 'study');
-const TRIALS = 210;
+const TRIALS = 210, PRACTICE = 2, CATCH = 3;
+const CARD_PX = 300;  // where the slider of the calibration is left
 
 /** Starts the server and resolves with its address. */
 function serve(port = 0) {
   return new Promise((resolve, reject) => {
     const server = spawn(program, ['mlds', 'serve', path.join(work, 'stimuli', 'stimuli.json'),
-      '--out', study, '--practice', '2', '--catch', '3', '--seed', '7', '--port', String(port)]);
+      '--out', study, '--practice', String(PRACTICE), '--catch', String(CATCH), '--seed', '7', '--port', String(port)]);
     server.stderr.pipe(process.stderr);
     server.stdout.on('data', (bytes) => {
       const url = String(bytes).trim();
@@ -45,7 +46,8 @@ async function begin(page, url, code, isPhotographed) {
   if (isPhotographed) await picture(page, 'instructions');
   await page.click('#next');
   await page.waitForSelector('#size');
-  await page.fill('#size', '324');
+  await page.fill('#size', String(CARD_PX));
+  await page.fill('#distance', '60');
   if (isPhotographed) await picture(page, 'calibration');
   await page.click('#next');
   await page.waitForFunction(() => document.querySelector('h1')?.textContent === 'Ready');
@@ -53,7 +55,8 @@ async function begin(page, url, code, isPhotographed) {
 }
 
 /** Answers questions until `until` of them are answered; notes what was chosen. */
-async function work_through(page, chosen, until, useMouse, isPhotographed) {
+async function work_through(person, until, isPhotographed) {
+  const { page, chosen, mouse: useMouse } = person;
   for (;;) {
     await page.waitForFunction(() => document.getElementById('screen').dataset.finished
       || (document.getElementById('next') && document.querySelector('h1')?.textContent !== 'Ready')
@@ -62,7 +65,10 @@ async function work_through(page, chosen, until, useMouse, isPhotographed) {
           === document.getElementById('screen').dataset.trial), null, { polling: 20 });
     if (await page.evaluate(() => document.getElementById('screen').dataset.finished)) return true;
     if (await page.$('#next')) {
-      if (isPhotographed) await picture(page, 'break');
+      if (await page.textContent('h1') === 'A break') {
+        person.breaks.push(chosen.length);
+        if (isPhotographed) await picture(page, 'break');
+      }
       await page.click('#next');
       continue;
     }
@@ -70,6 +76,8 @@ async function work_through(page, chosen, until, useMouse, isPhotographed) {
       document.getElementById('screen').dataset.trial));
     if (trial >= until) return false;
     assert.strictEqual(trial, chosen.length, 'questions come one after the other');
+    const says = await page.textContent('.question');
+    assert.strictEqual(/^For practice/.test(says), trial < PRACTICE, says);
     const top = (trial * 7 + (useMouse ? 1 : 0)) % 3 !== 0;
     await page.waitForTimeout(205);  // earlier answers are taken for a key still held
     if (isPhotographed && trial === 5) await picture(page, 'trial');
@@ -97,6 +105,16 @@ function check_files(code, chosen) {
     const isFirstOnTop = top[0] === first[0] && top[1] === first[1];
     assert.strictEqual(Number(row.resp), (row.choice === 'top') === isFirstOnTop ? 0 : 1);
   });
+  const count = (kind) => log.filter((row) => row.kind === kind).length;
+  assert.strictEqual(count('practice'), PRACTICE);
+  assert.strictEqual(count('catch'), CATCH);
+  // 8 degrees at 60 cm are 83.9 mm, for which the test's window has room.
+  const session = JSON.parse(fs.readFileSync(path.join(folder, 'session.json'), 'utf8'));
+  assert.ok(Math.abs(session.calibration.px_per_mm - CARD_PX / 85.6) < 1e-9);
+  assert.strictEqual(session.calibration.distance_mm, 600);
+  assert.strictEqual(session.has_consented, true);
+  const wished = 2 * 600 * Math.tan(4 * Math.PI / 180) * CARD_PX / 85.6;
+  log.forEach((row) => assert.ok(Math.abs(row.stimulus_size_px - wished) < 0.1, row.stimulus_size_px));
   const main = log.filter((row) => row.kind === 'main');
   assert.strictEqual(main.length, TRIALS);
   assert.strictEqual(new Set(main.map((r) => [r.S1, r.S2, r.S3, r.S4].join())).size, TRIALS);
@@ -124,16 +142,16 @@ async function main() {
     });
     return page;
   };
-  const people = [{ code: 'ann-1', page: await open(), chosen: [], mouse: false },
-    { code: 'bob_2', page: await open(), chosen: [], mouse: true }];
+  const people = [{ code: 'ann-1', page: await open(), chosen: [], breaks: [], mouse: false },
+    { code: 'bob_2', page: await open(), chosen: [], breaks: [], mouse: true }];
 
   await Promise.all(people.map((p, i) => begin(p.page, url, p.code, i === 0)));
   await Promise.all(people.map((p, i) =>
-    work_through(p.page, p.chosen, 40 + 11 * i, p.mouse, i === 0)));
+    work_through(p, 40 + 11 * i, i === 0)));
 
   // A reload in the middle comes back to the same question.
   await people[0].page.reload();
-  await work_through(people[0].page, people[0].chosen, 60, false, true);
+  await work_through(people[0], 60, true);
 
   // The server dies without warning, and one page answers while it is away.
   server.kill('SIGKILL');
@@ -151,10 +169,12 @@ async function main() {
   people[0].chosen.pop();
   await Promise.all(people.map((p) => p.page.goto('about:blank').then(() => p.page.goto(url))));
   const finished = await Promise.all(people.map((p) =>
-    work_through(p.page, p.chosen, 1e9, p.mouse, p.mouse)));
+    work_through(p, 1e9, p.mouse)));
   assert.deepStrictEqual(finished, [true, true]);
   await picture(people[0].page, 'thanks');
   for (const p of people) check_files(p.code, p.chosen);
+  // A rest after every 70 questions at a stretch; both were greeted anew at 60 and 51.
+  assert.deepStrictEqual(people.map((p) => p.breaks), [[130, 200], [121, 191]]);
   assert.deepStrictEqual(errors, []);
   await browser.close();
   server.kill('SIGTERM');

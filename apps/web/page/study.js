@@ -148,7 +148,9 @@ const instructions = () => page('What to do', 'I have understood',
   paragraph('In which pair do the two pictures differ more? Press the up arrow for the pair above '
     + 'or the down arrow for the pair below, or click on the pair.'),
   paragraph('There is no right or wrong. If both seem alike, choose what seems a little more '
-    + 'different. Take your time; you can rest whenever a break is offered.'));
+    + 'different. Take your time; you can rest whenever a break is offered.'),
+  paragraph('Dim the room so that nothing is mirrored in the screen, and keep your distance from it '
+    + 'the same throughout.', 'hint'));
 
 async function calibrate() {
   const known = state.calibration;
@@ -194,12 +196,31 @@ async function loadPictures() {
   }
 }
 
-/** Side of a picture in CSS pixels for the wished visual angle, if the window has room. */
-function pictureSize() {
+/** Side of a picture in CSS pixels for the wished visual angle. */
+function wishedSize() {
   const { px_per_mm: scale, distance_mm: distance } = state.calibration;
-  const wished = 2 * distance * Math.tan(study.picture_deg * Math.PI / 360) * scale;
+  return 2 * distance * Math.tan(study.picture_deg * Math.PI / 360) * scale;
+}
+
+/** What the window has room for of it. */
+function pictureSize() {
   const room = Math.min((innerHeight - 150) / 2, (innerWidth - 80) / 2);
-  return Math.max(64, Math.min(wished, room));
+  return Math.max(64, Math.min(wishedSize(), room));
+}
+
+/** A button for the whole screen and, while the window is too small, words that say so. */
+function windowAdvice() {
+  const words = paragraph('', 'hint');
+  const look = () => {
+    const share = pictureSize() / wishedSize();
+    words.textContent = share > 0.99 ? 'The window is large enough.'
+      : `The window is too small: the pictures would be shown at ${Math.round(100 * share)} % of `
+        + 'their size. Please make it larger.';
+  };
+  addEventListener('resize', look);
+  look();
+  return [words, element('button', { className: 'main', type: 'button', id: 'fullscreen',
+    onclick: () => document.documentElement.requestFullscreen().catch(() => {}) }, 'Full screen')];
 }
 
 function nextFrame() {
@@ -270,10 +291,10 @@ async function run() {
     await loadPictures();
     if (!isNew) {
       await page('Welcome back', 'Go on', paragraph(`You have answered ${state.next} of `
-        + `${state.total} questions. The next one comes when you are ready.`));
+        + `${state.total} questions. The next one comes when you are ready.`), ...windowAdvice());
     } else {
       await page('Ready', 'Start', paragraph(`There are ${state.total} questions. The first one `
-        + 'comes when you press the button.'));
+        + 'comes when you press the button.'), ...windowAdvice());
     }
   }
   let sinceBreak = 0;
@@ -283,6 +304,7 @@ async function run() {
       await page('A break', 'Go on', paragraph(`${state.next} of ${state.total} questions are `
         + 'done. Look into the distance for a while; go on when you like.'));
     }
+    await calibrate();  // anew where the page was zoomed
     await askQuestion();
     ++sinceBreak;
   }
