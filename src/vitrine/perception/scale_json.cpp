@@ -255,7 +255,6 @@ std::string series_to_json(const StimulusSeries& series) {
     root["integrator"] = series.integrator;
     root["exposure"] = series.exposure;
     root["noise_delta_l"] = series.noise_delta_l;
-    root["noise_delta_l_seen"] = series.noise_delta_l_seen;
     return root.dump(2) + "\n";
 }
 
@@ -286,7 +285,6 @@ StimulusSeries series_from_json(const std::string& text, const std::string& name
     series.integrator = root.text_or("integrator", "");
     series.exposure = root.number_or("exposure", 1.0);
     series.noise_delta_l = root.number_or("noise_delta_l", 0.0);
-    series.noise_delta_l_seen = root.number_or("noise_delta_l_seen", 0.0);
     root.finish();
     return series;
 }

@@ -24,9 +24,8 @@ struct StimulusSeries {
     std::string title;                ///< for the experimenter
     std::string integrator;           ///< "photon" or "path"
     double exposure = 1.0;            ///< one factor for all pictures
-    double noise_delta_l = 0.0;       ///< 99th percentile over the pixels of |Delta L*| between two
-                                      ///< renders of one stimulus with different seeds
-    double noise_delta_l_seen = 0.0;  ///< the same after the blur of the computational observer
+    double noise_delta_l = 0.0;       ///< standard deviation of L* between two renders of one
+                                      ///< stimulus, 99th percentile over pixels
 };
 std::string series_to_json(const StimulusSeries& series);
 StimulusSeries series_from_json(const std::string& text, const std::string& name);

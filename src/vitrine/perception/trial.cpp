@@ -154,7 +154,7 @@ std::vector<Observations> parse_trials_csv(const std::string& text, const std::s
         const Trial trial = parse_row(fields, columns, where);
         auto known = std::find_if(all.begin(), all.end(),
                                   [&](const Observations& o) { return o.observer == observer; });
-        if (known == all.end()) known = all.insert(known, {observer, {}});
+        if (known == all.end()) known = all.insert(known, Observations{observer, {}});
         if (kind == "main") {
             known->trials.push_back(trial);
         } else {

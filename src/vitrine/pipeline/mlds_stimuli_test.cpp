@@ -103,6 +103,8 @@ TEST(MldsReport, IsOnePageThatNamesWhatItShows) {
     EXPECT_NE(html.find("A &lt;study&gt;"), std::string::npos);
     EXPECT_NE(html.find("lambda = 0.01"), std::string::npos);
     EXPECT_NE(html.find("not measured with people"), std::string::npos);
+    // 0.006 computed beside 0.010 measured at 1.4.
+    EXPECT_NE(html.find("<td class=\"number\">0.6</td>"), std::string::npos);
     EXPECT_NE(html.find("unbounded"), std::string::npos);
     EXPECT_EQ(html.find("nan"), std::string::npos);
     EXPECT_EQ(html.find("http"), std::string::npos);
