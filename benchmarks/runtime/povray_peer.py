@@ -21,7 +21,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 def povray_rate(count, folder):
     """Stored photons and CPU seconds of POV-Ray's photon pass, on one thread."""
     command = ["povray", f"+I{HERE / 'canonical.pov'}", "+W8", "+H8", "+WT1", "-D", "-GA",
-               f"Declare=Count={count}", f"+O{folder}/picture.png"]
+               f"Declare=Count={count}", f"+O{folder}/picture.png", "All_Console=On"]
     log = subprocess.run(command, capture_output=True, text=True, check=True).stderr
     stored = int(re.search(r"Surface photons stored:\s+(\d+)", log)[1])
     seconds = float(re.search(r"Photon Time:.*?with ([\d.]+) CPU-seconds", log, re.S)[1])

@@ -1,15 +1,15 @@
-// vitrine_raw_limit: how near the renderer comes to Embree's own rate.
+// vitrine_raw_limit [SCENE.json]: how near the renderer comes to Embree's own rate.
 //
 // The rays of a run are recorded (see ray_recorder.h) and sent again with nothing in between:
 // ratio = seconds of the bare rays / seconds of the run, with shading, sampling and storing in the
-// run alone. One thread, CPU time, run and list in turn, medians.
+// run alone. Without a scene: the canonical one, whose three parts cost a ray next to nothing; a
+// measured scene (40_scene/scene.json of a workspace) is what the renderer is for. One thread, CPU
+// time, run and list in turn, medians.
 #include "base/parallel.h"
 #include "canonical_scene.h"
 #include "cpu_time.h"
 #include "ray_recorder.h"
 #include "render/render_image.h"
-
-#include <cstdlib>
 
 using namespace vitrine;
 
@@ -44,10 +44,9 @@ void compare(const char* name, const Run& run) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    const int triangles = argc > 1 ? std::atoi(argv[1]) : 20'000;
     set_thread_count(1);
-    const RenderScene scene(canonical_scene(triangles));
-    const Camera camera = scene.scene().cameras[2].scaled(0.5);
+    const RenderScene scene(argc > 1 ? read_scene(argv[1]) : canonical_scene());
+    const Camera camera = scene.scene().cameras.at(2).scaled(0.5);
 
     CausticOptions caustics;
     caustics.photon_count = 200'000;
