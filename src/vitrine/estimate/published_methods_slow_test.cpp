@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace vitrine {
 namespace {
 
@@ -28,7 +30,7 @@ EstimateOptions options_of(EstimateMethod method) {
     return options;
 }
 
-TEST(PublishedMethods, PaperFindsLightAndIndexOnItsGrids) {
+TEST(PublishedMethods, PaperFindsIndexOnItsGrid) {
     const World world = make_world(small(3, WorldObject::Glass));
     EstimateOptions options = options_of(EstimateMethod::Paper);
     ObjectOverride known;  // the printed rule is chance: what follows it is under test
@@ -38,7 +40,13 @@ TEST(PublishedMethods, PaperFindsLightAndIndexOnItsGrids) {
     const SceneEstimate e = estimate_scene(world.labelled, world.capture, options);
     EXPECT_EQ(e.method, EstimateMethod::Paper);
     ASSERT_FALSE(e.light.lights.empty());
-    EXPECT_LT(light_error_deg(e.light, world), 25.0);
+    // Where it was found at first, or one of the ring of places around that.
+    const LightEstimate first = estimate_first_light(world.labelled, world.capture, options);
+    const double moved_deg =
+        degrees(angle_between(e.light.lights[0].light.position_m - e.light.reference_point_m,
+                              first.lights.at(0).light.position_m - first.reference_point_m));
+    EXPECT_TRUE(moved_deg < 0.01 || std::abs(moved_deg - options.paper.local_radius_deg) < 0.01)
+        << moved_deg;
     ASSERT_EQ(e.objects.size(), 1u);
     const double ior = std::get<Dielectric>(world.truth.parts[1].material).ior;
     EXPECT_NEAR(e.objects[0].ior.value, ior, 0.15);
