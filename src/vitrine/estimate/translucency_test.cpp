@@ -300,8 +300,11 @@ TEST(ReliefRefinement, ShadingOfKnownLightsGivesTheBumps) {
     // A picture that the start explains already changes nothing.
     const ReliefIrradiance plain = irradiance_from_lights(smooth, lights, 1.0);
     const Relief same = refine_relief(smooth, plain.front, Mask(), lights, 0, 1.0);
-    for (std::size_t i = 0; i < same.mask.size(); ++i)
-        if (same.mask[i] > 127) EXPECT_NEAR(same.depth_px[i], smooth.depth_px[i], 3);
+    for (std::size_t i = 0; i < same.mask.size(); ++i) {
+        if (same.mask[i] > 127) {
+            EXPECT_NEAR(same.depth_px[i], smooth.depth_px[i], 3);
+        }
+    }
 }
 
 TEST(Highlights, MatteObjectHasNone) {
