@@ -12,6 +12,7 @@ struct TransferTexts {
     std::string source_box, target_box, method = "default", lights = "diffusion";
     std::string solver = "monotone", coupling = "ordered", irradiance = "photo";
     std::string highlights = "residual", colour_space = "srgb";
+    std::string shape = "auto", transmittance = "auto", body = "curved";
     bool is_colour_free = false;
 };
 
@@ -86,6 +87,23 @@ void add_method(CLI::App& command, TransferRequest& request, TransferTexts& text
                        "Light on the visible side: read off the photo, or from the lights")
            ->check(CLI::IsMember({"photo", "lights"})));
     in(command
+           .add_option("--shape", texts.shape,
+                       "Of the material: a cluster of balls where the photo shows one, or always "
+                       "one body")
+           ->check(CLI::IsMember({"auto", "inflated"})));
+    in(command
+           .add_option("--refine", analysis.refinement_rounds,
+                       "Rounds of shape by the lights found and lights again (material photo)")
+           ->check(CLI::Range(0, 8)));
+    in(command
+           .add_option("--transmittance", texts.transmittance,
+                       "Of the material's surface; auto: what explains the photo better")
+           ->check(CLI::IsMember({"auto", "fresnel", "none"})));
+    in(command
+           .add_option("--body", texts.body,
+                       "Light through a closed body, or the flat profile as published")
+           ->check(CLI::IsMember({"curved", "flat"})));
+    in(command
            .add_option("--softness", analysis.softness,
                        "1: soft shading is the material's in the material photo and the light's "
                        "in the object photo; 0.5: no opinion")
@@ -123,6 +141,10 @@ void resolve(TransferRequest& request, const TransferTexts& texts, std::uint64_t
     if (texts.solver == "qmr") analysis.bssrdf.solver = ProfileSolver::Qmr;
     if (texts.coupling == "free") analysis.bssrdf.coupling = ChannelCoupling::Free;
     if (texts.irradiance == "lights") request.irradiance = IrradianceSource::Lights;
+    if (texts.shape == "inflated") analysis.shape = ShapeModel::Inflated;
+    if (texts.transmittance == "fresnel") analysis.bssrdf.transmittance = Transmittance::Fresnel;
+    if (texts.transmittance == "none") analysis.bssrdf.transmittance = Transmittance::None;
+    analysis.bssrdf.use_curved_body = analysis.lights.use_curved_body = texts.body == "curved";
     if (texts.highlights == "phong") request.look.highlights = HighlightTransfer::Phong;
     request.look.keep_colour = !texts.is_colour_free;
     analysis.lights.seed = analysis.bssrdf.seed = seed + 1;

@@ -9,7 +9,9 @@
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
+#include "image/poisson.h"
 #include "math/statistics.h"
+#include "render/render_object.h"
 #include "transfer_measures.h"
 
 #include <fmt/format.h>
@@ -22,11 +24,23 @@ namespace fs = std::filesystem;
 
 namespace {
 
+/// A lamp of the truth: an evenly emitting disc at a finite distance, facing the object's centre.
+struct NearLamp {
+    Vec3 position_px = Vec3::Zero();  ///< viewer frame of the relief
+    Vec3 direction = Vec3::Zero();    ///< unit, from the object's centre toward it
+    Rgbd irradiance = Rgbd::Zero();   ///< at the object's centre, facing it, units of the photo
+    double distance_px = 1;
+};
+
 struct TruthPhoto {
     std::string name;
     Photo photo;
-    Relief relief;      ///< true normals and depth, mirrored about the silhouette's mean depth
+    Relief relief;      ///< true normals, depth over the middle surface
     ViewLights lights;  ///< true, normalised
+    ImageF height_px;   ///< true, above the object's centre
+    std::vector<NearLamp> lamps;
+    Rgbd ambient = Rgbd::Zero();  ///< irradiance, units of the photo
+    Rgbd ground = Rgbd::Zero();   ///< radiance of what lies around the object's lower half, as seen
     double px_per_m = 0;
     double exposure_scale = 1;
     std::string material;
@@ -67,6 +81,86 @@ RadialProfile read_profile_csv(const fs::path& path) {
     return profile;
 }
 
+/// Mean radiance around the lower half of the object: the table, as the photo shows it.
+Rgbd surroundings_below(const ImageRgb& picture, const Relief& relief) {
+    const ImageF away = distance_to(relief.mask);
+    double rows = 0, inside = 0, count = 0;
+    for (int y = 0; y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x) {
+            if (!is_inside(relief.mask, x, y)) continue;
+            rows += y;
+            inside += 1;
+        }
+    }
+    Rgbd sum = Rgbd::Zero();
+    for (int y = static_cast<int>(rows / inside); y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x) {
+            if (away(x, y) <= 3 || away(x, y) > 1.5 * relief.inradius_px) continue;
+            sum += picture(x, y).cast<double>();
+            count += 1;
+        }
+    }
+    return sum / std::max(count, 1.0);
+}
+
+/// The balls of a cluster that the photo shows, moved to where the true depth and normals have
+/// them: p - R n is one point for all pixels of a ball.
+Relief true_cluster(const TruthPhoto& truth, const Relief& found) {
+    std::vector<Ball> balls;
+    for (std::size_t k = 0; k < found.balls.size(); ++k) {
+        Vec3 p_mean = Vec3::Zero(), n_mean = Vec3::Zero();
+        std::vector<Vec3> points, normals;
+        for (int y = 0; y < found.mask.height(); ++y) {
+            for (int x = 0; x < found.mask.width(); ++x) {
+                if (found.ball_of(x, y) != static_cast<std::int16_t>(k)) continue;
+                const Vec2 v(x - found.balls[k].centre_px.x(), -y - found.balls[k].centre_px.y());
+                if (v.norm() > 0.85 * found.balls[k].radius_px) continue;
+                points.emplace_back(x, -y, truth.height_px(x, y));
+                normals.push_back(truth.relief.normals(x, y).cast<double>());
+                p_mean += points.back();
+                n_mean += normals.back();
+            }
+        }
+        if (points.size() < 50) continue;
+        p_mean /= static_cast<double>(points.size());
+        n_mean /= static_cast<double>(points.size());
+        double above = 0, below = 0;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            above += (points[i] - p_mean).dot(normals[i] - n_mean);
+            below += (normals[i] - n_mean).squaredNorm();
+        }
+        const double radius = above / below;
+        balls.push_back({(p_mean - radius * n_mean).cast<float>(), static_cast<float>(radius)});
+    }
+    return relief_of_balls(truth.photo.mask, balls);
+}
+
+/// All light that is known of the truth: near lamps, the grey surroundings, and the table at the
+/// radiance that the photo shows; with the object's own shadows.
+std::vector<Rgb> true_light(const TruthPhoto& truth, const Relief& relief,
+                            const SurfacePoints& points, double eta) {
+    ViewLights even;
+    even.ambient = truth.ambient;
+    even.from_below = truth.ground * kPi;
+    std::vector<Rgb> result = entering_light(relief, points, even, eta, true);
+    // The grey surroundings end where the table begins.
+    const SkyShares sky = sky_shares(relief, points);
+    for (const NearLamp& lamp : truth.lamps) {
+        const std::vector<float> seen = visibility(relief, points, lamp.direction);
+        for (std::size_t i = 0; i < result.size(); ++i) {
+            const Vec3 way = lamp.position_px - points.position[i].cast<double>();
+            const Vec3 w = way.normalized();
+            const double falloff =
+                std::pow(lamp.distance_px / way.norm(), 2) * std::max(0.0, w.dot(lamp.direction));
+            const double e = entering_irradiance(points.normal[i], w, eta) * falloff * seen[i];
+            result[i] += (lamp.irradiance * e).cast<float>();
+        }
+    }
+    for (std::size_t i = 0; i < result.size(); ++i)
+        result[i] -= truth.ambient.cast<float>() * sky.below[i];
+    return result;
+}
+
 TruthPhoto read_truth(const fs::path& folder, const std::string& name) {
     TruthPhoto truth;
     truth.name = name;
@@ -96,18 +190,40 @@ TruthPhoto read_truth(const fs::path& folder, const std::string& name) {
     relief.inradius_px = inradius_px(relief.mask);
     relief.depth_px = ImageF(z.width(), z.height());
     relief.normals = Image<Vec3f>(z.width(), z.height(), Vec3f(0, 0, 1));
-    // The silhouette plane: median depth of the rim.
-    std::vector<double> rim;
-    const ImageF inside = distance_to(mask_not(relief.mask));
+    truth.height_px = ImageF(z.width(), z.height());
+    const double centre_m = json.object("object").numbers("centre_camera_m", 3)[2];
     for (std::size_t i = 0; i < z.size(); ++i)
-        if (relief.mask[i] > 127 && inside[i] < 2.5f) rim.push_back(z[i]);
-    const double plane = median(rim);
+        truth.height_px[i] = static_cast<float>((-z[i] - centre_m) * truth.px_per_m);
+    // The middle surface, about which the unseen back mirrors the front: a membrane over the rim.
+    ImageRgb middle(z.width(), z.height());
+    for (std::size_t i = 0; i < z.size(); ++i) middle[i] = Rgb::Constant(z[i]);
+    relief.middle_px = ImageF(z.width(), z.height());
+    const Mask inner = erode(relief.mask, 2);
+    middle = harmonic_fill(extend_nearest(middle, relief.mask), inner);
     for (std::size_t i = 0; i < z.size(); ++i) {
         if (relief.mask[i] <= 127) continue;
-        relief.depth_px[i] = std::max(0.5f, static_cast<float>((plane - z[i]) * truth.px_per_m));
+        relief.middle_px[i] = static_cast<float>((-middle[i][0] - centre_m) * truth.px_per_m);
+        relief.depth_px[i] = std::max(truth.height_px[i], relief.middle_px[i] + 0.5f);
         const Vec3f n(normal[i][0], normal[i][1], normal[i][2]);
         if (n.norm() > 0.5f) relief.normals[i] = n.normalized();
     }
+    const JsonObject camera = json.object("camera");
+    for (const JsonObject& light : json.objects("lights")) {
+        NearLamp lamp;
+        const std::vector<double> p = light.numbers("position_camera_m", 3);
+        const std::vector<double> d = light.numbers("direction_camera", 3);
+        const std::vector<double> e = light.numbers("irradiance_facing", 3);
+        lamp.position_px =
+            Vec3(camera.number("cx") + p[0] * truth.px_per_m,
+                 -camera.number("cy") + p[1] * truth.px_per_m, (p[2] - centre_m) * truth.px_per_m);
+        lamp.direction = Vec3(d[0], d[1], d[2]).normalized();
+        lamp.irradiance = Rgbd(e[0], e[1], e[2]) / truth.exposure_scale;
+        lamp.distance_px = light.number("distance_m") * truth.px_per_m;
+        truth.lamps.push_back(lamp);
+    }
+    truth.ambient =
+        Rgbd::Constant(kPi * json.object("ambient").number("radiance") / truth.exposure_scale);
+    truth.ground = surroundings_below(truth.photo.linear, relief);
     if (fs::exists(folder / "profiles" / (truth.material + ".csv")))
         truth.profile_mm = read_profile_csv(folder / "profiles" / (truth.material + ".csv"));
     return truth;
@@ -142,7 +258,19 @@ void print_lights(const TruthPhoto& truth, const ViewLights& found, std::vector<
         fmt::print(" ({:.2f} {:.2f} {:.2f}) {:.0f} %", light.direction.x(), light.direction.y(),
                    light.direction.z(), 100 * luminance(light.intensity) / total);
     }
-    fmt::print(" ambient {:.0f} %\n", 100 * luminance(found.ambient) / total);
+    fmt::print(" ambient {:.0f} % ground {:.0f} %\n", 100 * luminance(found.ambient) / total,
+               50 * luminance(found.from_below) / total);
+}
+
+void print_highlight_lights(const PhotoAnalysis& analysis, const TruthPhoto& truth) {
+    fmt::print("  highlight lamps (votes: degrees to the nearest true lamp):");
+    for (const HighlightLight& light : analysis.highlight_lights) {
+        double best = 180;
+        for (const ViewLight& other : truth.lights.lights)
+            best = std::min(best, degrees(angle_between(light.direction, other.direction)));
+        fmt::print(" {}: {:.0f} ({:.0f} %)", light.votes, best, 100 * luminance(light.intensity));
+    }
+    fmt::print("\n");
 }
 
 void print_profile(const TruthPhoto& truth, const MediumEstimate& medium, const char* label) {
@@ -187,10 +315,17 @@ int main(int argc, char** argv) {
         if (name == "--highlights" && value == "phong")
             look.highlights = HighlightTransfer::Phong, look.phong_exponent = 5;
         if (name == "--irradiance" && value == "lights") irradiance = IrradianceSource::Lights;
+        if (name == "--body" && value == "flat")
+            options.bssrdf.use_curved_body = options.lights.use_curved_body = false;
+        if (name == "--shape" && value == "inflated") options.shape = ShapeModel::Inflated;
+        if (name == "--refine") options.refinement_rounds = std::atoi(value.c_str());
         if (name == "--coupling" && value == "free")
             options.bssrdf.coupling = ChannelCoupling::Free;
     }
     if (!dump.empty()) fs::create_directories(dump);
+
+    TranslucentRenderOptions render_options;
+    render_options.use_curved_body = options.bssrdf.use_curved_body;
 
     std::vector<double> key, fill;
     std::map<std::string, LiftedMaterial> lifted;
@@ -200,20 +335,29 @@ int main(int argc, char** argv) {
         const Timer timer;
         LiftedMaterial material = lift_material(truth.photo, options);
         fmt::print("{} ({}), {:.1f} s\n", name, truth.material, timer.seconds());
-        fmt::print("  highlights {:.1f} % of the object, {} blobs; normals {:.1f} deg mean\n",
-                   100 * material.analysis.highlights.share,
-                   material.analysis.highlights.blobs.size(),
-                   mean_normal_error_deg(material.analysis.relief, truth.relief));
+        fmt::print(
+            "  highlights {:.1f} % of the object, {} blobs; normals {:.1f} deg mean, {} balls\n",
+            100 * material.analysis.highlights.share, material.analysis.highlights.blobs.size(),
+            mean_normal_error_deg(material.analysis.relief, truth.relief),
+            material.analysis.relief.balls.size());
+        print_highlight_lights(material.analysis, truth);
         print_lights(truth, material.analysis.lights.lights, key, fill);
         print_profile(truth, material.medium, "blind");
         fmt::print("  self PSNR {:.1f} dB (flat colour {:.1f} dB), light residual {:.2f}\n",
                    material.self_psnr_db, material.flat_psnr_db,
                    material.analysis.lights.relative_residual);
-        ViewLights true_lights = truth.lights;
-        normalise_lights(true_lights, truth.relief, options.bssrdf.eta);
+        const Relief true_relief = material.analysis.relief.is_cluster()
+                                       ? true_cluster(truth, material.analysis.relief)
+                                       : truth.relief;
+        const EnteringLight light = [&](const SurfacePoints& points, double eta) {
+            return true_light(truth, true_relief, points, eta);
+        };
         const MediumEstimate known =
-            estimate_bssrdf(material.analysis.highlights.diffuse, truth.relief,
-                            material.analysis.highlights.grown, true_lights, options.bssrdf);
+            estimate_bssrdf(material.analysis.highlights.diffuse, true_relief,
+                            material.analysis.highlights.grown, light, options.bssrdf);
+        fmt::print("  {}, residuals {:.3f} {:.3f} {:.3f}\n",
+                   known.is_fresnel ? "Fresnel" : "no Fresnel", known.channels[0].relative_residual,
+                   known.channels[1].relative_residual, known.channels[2].relative_residual);
         print_profile(truth, known, "true shape and lights");
         for (const std::string& warning : material.analysis.warnings)
             fmt::print("  ! {}\n", warning);
@@ -239,6 +383,7 @@ int main(int argc, char** argv) {
             "mean\n",
             name, timer.seconds(), 100 * object.highlights.share, object.highlights.blobs.size(),
             mean_normal_error_deg(object.relief, truth.relief));
+        print_highlight_lights(object, truth);
         print_lights(truth, object.lights.lights, key, fill);
         if (!dump.empty()) {
             dump_encoded(dump / (name + "_diffuse.png"), object.highlights.diffuse);
@@ -246,7 +391,7 @@ int main(int argc, char** argv) {
             dump_relief(dump / (name + "_relief.png"), object.relief);
             dump_relief(dump / (name + "_true_relief.png"), truth.relief);
         }
-        const TransferSession session(object, irradiance);
+        const TransferSession session(object, irradiance, render_options);
         {
             const RadialProfile profile = lifted.at("s1").medium.profile();
             const Timer look_timer;
@@ -254,7 +399,7 @@ int main(int argc, char** argv) {
             brighter.exposure = 1.1;
             session.render(profile, brighter);
             const double look_s = look_timer.seconds();
-            TransferSession relit(object, irradiance);
+            TransferSession relit(object, irradiance, render_options);
             const Timer light_timer;
             relit.set_lights(object.lights.lights);
             relit.render(profile, brighter);

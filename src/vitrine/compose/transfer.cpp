@@ -2,10 +2,13 @@
 
 #include "compose/object_irradiance.h"
 #include "estimate/highlight_light.h"
+#include "estimate/relief_refinement.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/poisson.h"
 #include "math/statistics.h"
+#include "render/render_object.h"
+#include "render/translucent_shadow_map.h"
 
 namespace vitrine {
 namespace {
@@ -19,8 +22,11 @@ double white_of(const Photo& photo) {
     return std::max(quantile(std::move(values), 0.95), 1e-9) / srgb_to_linear(0.8f);
 }
 
-PhotoAnalysis analyse(const Photo& photo, double role_softness,
-                      const TransferAnalysisOptions& options, const Progress& progress) {
+/// Only a material photo may show a cluster: what is dressed is one body.
+enum class Role { Material, Object };
+
+PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptions& options,
+                      const Progress& progress) {
     PhotoAnalysis analysis;
     analysis.photo = photo;
     analysis.white = white_of(photo);
@@ -29,7 +35,12 @@ PhotoAnalysis analyse(const Photo& photo, double role_softness,
     analysis.highlights =
         find_highlights(photo.linear, photo.mask, photo.saturation_level, options.highlights);
     progress.update(0.2, "shape");
-    analysis.relief = shade_to_shape(analysis.highlights.diffuse, photo.mask, options.relief);
+    std::vector<Ball> balls;
+    if (options.shape == ShapeModel::Auto && role == Role::Material)
+        balls = find_balls(analysis.highlights.diffuse, photo.mask, options.balls);
+    analysis.relief = balls.empty()
+                          ? shade_to_shape(analysis.highlights.diffuse, photo.mask, options.relief)
+                          : relief_of_balls(photo.mask, std::move(balls));
     progress.update(0.4, "lights");
     analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
     if (options.light_method == LightMethod::LopezMoreno) {
@@ -37,10 +48,26 @@ PhotoAnalysis analyse(const Photo& photo, double role_softness,
                                                        analysis.highlights.grown);
     } else {
         TranslucencyLightOptions light_options = options.lights;
-        light_options.softness = role_softness;
-        analysis.lights = estimate_translucency_lights(
-            analysis.highlights.diffuse, analysis.relief, analysis.highlights.grown,
-            analysis.highlight_lights, light_options, progress.part(0.4, 1.0));
+        light_options.softness = role == Role::Material ? options.softness : 1 - options.softness;
+        const auto estimate = [&] {
+            analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
+            analysis.lights = estimate_translucency_lights(
+                analysis.highlights.diffuse, analysis.relief, analysis.highlights.grown,
+                analysis.highlight_lights, light_options);
+        };
+        estimate();
+        const bool is_refined = role == Role::Material && !analysis.relief.is_cluster();
+        const int rounds = is_refined ? options.refinement_rounds : 0;
+        for (int round = 0; round < rounds; ++round) {
+            ReliefOptions dome = options.relief;
+            dome.alpha = 0;
+            analysis.relief =
+                refine_relief(shade_to_shape(analysis.highlights.diffuse, photo.mask, dome),
+                              analysis.highlights.diffuse, analysis.highlights.grown,
+                              analysis.lights.lights, analysis.lights.kernel_px, light_options.eta);
+            estimate();
+            progress.update(0.4 + 0.5 * (round + 1) / rounds, "shape and lights");
+        }
     }
     analysis.warnings.insert(analysis.warnings.end(), analysis.lights.warnings.begin(),
                              analysis.lights.warnings.end());
@@ -70,7 +97,7 @@ ImageRgb scaled_image(ImageRgb image, double factor) {
 LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& options,
                              const Progress& progress) {
     LiftedMaterial lifted;
-    lifted.analysis = analyse(photo, options.softness, options, progress.part(0.0, 0.6));
+    lifted.analysis = analyse(photo, Role::Material, options, progress.part(0.0, 0.6));
     const PhotoAnalysis& analysis = lifted.analysis;
     const ImageRgb shown = scaled_image(analysis.highlights.diffuse, 1 / analysis.white);
     lifted.medium =
@@ -80,11 +107,10 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
     lifted.brightness = limit_albedo(lifted.medium);
 
     TranslucentRenderOptions render_options;
-    render_options.eta = options.bssrdf.eta;
-    const TranslucentRelief renderer(analysis.relief, render_options);
-    lifted.rendered = renderer.render(
-        irradiance_from_lights(analysis.relief, analysis.lights.lights, options.bssrdf.eta),
-        lifted.medium.profile());
+    render_options.eta = lifted.medium.is_fresnel ? options.bssrdf.eta : 1.0;
+    render_options.use_curved_body = options.bssrdf.use_curved_body;
+    lifted.rendered = render_object(analysis.relief, analysis.lights.lights,
+                                    lifted.medium.profile(), render_options);
     for (Rgb& pixel : lifted.rendered) pixel *= static_cast<float>(lifted.brightness);
     lifted.self_psnr_db =
         encoded_psnr(lifted.rendered, shown, photo.mask, analysis.highlights.grown);
@@ -106,7 +132,7 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
 
 PhotoAnalysis analyse_object(const Photo& photo, const TransferAnalysisOptions& options,
                              const Progress& progress) {
-    return analyse(photo, 1 - options.softness, options, progress);
+    return analyse(photo, Role::Object, options, progress);
 }
 
 double length_ratio(double source_inradius_px, double target_inradius_px, double source_px_per_m,
@@ -209,10 +235,15 @@ TransferPicture TransferSession::render(const RadialProfile& profile,
     const Mask& mask = object_.photo.mask;
     TransferPicture result;
     const RadialProfile stretched = look.scale == 1 ? profile : profile.scaled(look.scale);
-    result.diffuse = renderer_->render(irradiance_, stretched);
+    const auto lit = [&](const RadialProfile& material) {
+        return look.use_shadow_maps ? render_translucent_shadow_maps(
+                                          object_.relief, object_.lights.lights, material, options_)
+                                    : renderer_->render(irradiance_, material);
+    };
+    result.diffuse = lit(stretched);
     if (look.keep_colour && look.scale != 1) {
         // Longer paths lose light in a finite body, and unequally per channel.
-        const ImageRgb reference = renderer_->render(irradiance_, profile);
+        const ImageRgb reference = lit(profile);
         Rgbd wanted = Rgbd::Zero(), found = Rgbd::Zero();
         for (std::size_t i = 0; i < mask.size(); ++i) {
             wanted += reference[i].cast<double>();

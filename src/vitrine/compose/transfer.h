@@ -9,6 +9,7 @@
 #include "estimate/highlights.h"
 #include "estimate/lopez_moreno.h"
 #include "estimate/translucency_lights.h"
+#include "reconstruct/balls.h"
 #include "reconstruct/relief.h"
 #include "render/translucent_relief.h"
 
@@ -35,9 +36,19 @@ enum class HighlightTransfer {
     Phong,     ///< as published: a Phong lobe with H as gloss map
 };
 
+/// What the object's shape is taken for.
+enum class ShapeModel {
+    Auto,      ///< a cluster of balls where their outlines make up the object, else one body
+    Inflated,  ///< one body, as published
+};
+
 struct TransferAnalysisOptions {
     HighlightOptions highlights;
     ReliefOptions relief;
+    ShapeModel shape = ShapeModel::Auto;
+    BallOptions balls;
+    /// Of a material photo's one body: shape by the lights found, then lights again, so often.
+    int refinement_rounds = 2;
     LightMethod light_method = LightMethod::Diffusion;
     /// How firmly the roles are believed: 1, the material photo is soft because of its material
     /// and the object photo because of its light; 0.5, no opinion.
@@ -53,7 +64,7 @@ struct PhotoAnalysis {
     double white = 1;  ///< linear value shown as white
     Highlights highlights;
     Relief relief;
-    std::vector<ViewLight> highlight_lights;  ///< heaviest first
+    std::vector<HighlightLight> highlight_lights;  ///< heaviest first
     ViewLightsEstimate lights;
     std::vector<std::string> warnings;
 };
@@ -83,6 +94,8 @@ struct TransferLook {
     double highlight_weight = 0.5;  ///< share of the highlight light in `Phong`, rest to the others
     double added_gloss = 0;         ///< strength of a highlight added to a matte object
     double added_gloss_exponent = 80;
+    /// As published: translucent shadow maps under the object's lights in place of the lattice sum.
+    bool use_shadow_maps = false;
     double object_albedo = 0.7;  ///< assumed of the object as photographed: sets the light's level
 };
 

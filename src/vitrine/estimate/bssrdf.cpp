@@ -4,7 +4,6 @@
 #include "base/rng.h"
 #include "estimate/distance_histogram.h"
 #include "estimate/profile_fit.h"
-#include "estimate/translucency_lights.h"
 #include "image/filter.h"
 #include "math/statistics.h"
 
@@ -32,35 +31,26 @@ ImageRgb smooth_inside(const ImageRgb& image, const Mask& mask, const Mask& excl
     return weighted;
 }
 
-/// Entering irradiance per channel, at samples (times area) and at observations.
-void irradiance_fields(const Relief& relief, const ReliefSamples& samples,
-                       const ReliefObservations& observations, const ViewLights& lights,
-                       const BssrdfOptions& options, Eigen::MatrixXf& source,
-                       Eigen::MatrixXf& local) {
-    source.resize(static_cast<Index>(samples.position.size()), 3);
-    local.resize(static_cast<Index>(observations.position.size()), 3);
-    const auto fill = [&](Eigen::MatrixXf& field, const std::vector<Vec3f>& positions,
-                          const std::vector<Vec3f>& normals) {
-        for (Index i = 0; i < field.rows(); ++i)
-            field.row(i) = lights.ambient.cast<float>().matrix().transpose();
-        for (const ViewLight& light : lights.lights) {
-            std::vector<float> seen(positions.size(), 1.0f);
-            if (options.use_shadows) seen = visibility(relief, positions, normals, light.direction);
-            for (std::size_t i = 0; i < positions.size(); ++i) {
-                const double e =
-                    entering_irradiance(normals[i], light.direction, options.eta) * seen[i];
-                field.row(static_cast<Index>(i)) +=
-                    (light.intensity * e).cast<float>().matrix().transpose();
-            }
-        }
-    };
-    fill(source, samples.position, samples.normal);
-    for (std::size_t i = 0; i < samples.position.size(); ++i)
-        source.row(static_cast<Index>(i)) *= samples.area_px2[i];
-    fill(local, observations.position, observations.normal);
+/// A field of irradiance as the histogram takes it.
+Eigen::MatrixXf as_matrix(const std::vector<Rgb>& irradiance) {
+    Eigen::MatrixXf field(static_cast<Index>(irradiance.size()), 3);
+    for (Index i = 0; i < field.rows(); ++i)
+        field.row(i) = irradiance[static_cast<std::size_t>(i)].matrix().transpose();
+    return field;
 }
 
 const char* const kChannelNames[3] = {"red", "green", "blue"};
+
+/// Albedos as they will be once the brightest is brought down to a plausible one.
+std::vector<CurvedBodyFactor> body_factors(const MediumEstimate& medium) {
+    double largest = 0;
+    for (const TwoExponentials& fit : medium.fit) largest = std::max(largest, fit.total());
+    const double scale = largest > kPlausibleAlbedo ? kPlausibleAlbedo / largest : 1.0;
+    std::vector<CurvedBodyFactor> factors;
+    for (const TwoExponentials& fit : medium.fit)
+        factors.push_back(curved_body_factor(scale * fit.total()));
+    return factors;
+}
 
 void judge(MediumEstimate& medium, int c, double longest_px, double mean_exitance) {
     ChannelFit& channel = medium.channels[static_cast<std::size_t>(c)];
@@ -120,20 +110,35 @@ RadialProfile MediumEstimate::profile() const {
     return tabulate(fit, 0.01 * shortest, 16 * longest);
 }
 
-MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
-                               const ViewLights& lights, const BssrdfOptions& options,
-                               const Progress& progress) {
+namespace {
+
+/// The profile for one way of entering: fresnel or not.
+MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                          const EnteringLight& light, bool is_fresnel,
+                          const BssrdfOptions& options) {
     MediumEstimate medium;
     medium.eta = options.eta;
+    medium.is_fresnel = is_fresnel;
     medium.inradius_px = relief.inradius_px;
+    const double surface_eta = is_fresnel ? options.eta : 1.0;
     const ReliefObservations observations =
         draw_observations(relief, excluded, static_cast<std::size_t>(options.pixel_count), 2.0,
                           0.25, stream_key(options.seed, 0x22));
+    if (observations.pixel.size() < 50) {
+        for (ChannelFit& channel : medium.channels) {
+            channel.outcome = Outcome::NotIdentifiable;
+            channel.reason = "too few usable pixels";
+        }
+        medium.warnings.push_back("Too little of the object is free of highlights and rim.");
+        return medium;
+    }
     const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
-    Eigen::MatrixXf source, local;
-    irradiance_fields(relief, samples, observations, lights, options, source, local);
-    const DistanceHistogram histogram(observations, samples, source, local);
-    progress.update(0.5, "material: distances");
+    Eigen::MatrixXf source =
+        as_matrix(light({samples.position, samples.normal, samples.ball}, surface_eta));
+    for (Index i = 0; i < source.rows(); ++i)
+        source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
+    const Eigen::MatrixXf local = as_matrix(
+        light({observations.position, observations.normal, observations.ball}, surface_eta));
 
     const ImageRgb smooth =
         smooth_inside(diffuse, relief.mask, excluded, options.smoothing * relief.inradius_px);
@@ -142,65 +147,103 @@ MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, co
         const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
         exitance.row(static_cast<Index>(p)) =
             smooth[observations.pixel[p]].cast<double>().matrix().transpose() *
-            (kPi / fresnel_transmittance(cosine, options.eta));
+            (kPi / fresnel_transmittance(cosine, surface_eta));
     }
-    double inside = 0;
-    for (const std::uint8_t m : relief.mask) inside += m > 127 ? 1 : 0;
-    const double diameter = 2 * std::sqrt(inside / kPi);
+    double extent = 2 * relief.inradius_px;
+    if (!relief.is_cluster())
+        extent = 2 * std::sqrt(static_cast<double>(count_inside(relief.mask)) / kPi);
 
     ProfileFitOptions fit_options;
-    fit_options.longest_px = options.longest * diameter;
+    fit_options.longest_px = options.longest * extent;
     fit_options.shortest_px = 0.5 * samples.step_px;
-    fit_options.extent_px = diameter;
+    fit_options.extent_px = extent;
     fit_options.shell_count = options.shell_count;
     fit_options.ridge = options.ridge;
-    if (observations.pixel.size() < 50) {
-        for (int c = 0; c < 3; ++c) {
-            medium.channels[static_cast<std::size_t>(c)].outcome = Outcome::NotIdentifiable;
-            medium.channels[static_cast<std::size_t>(c)].reason = "too few usable pixels";
-        }
-        medium.warnings.push_back("Too little of the object is free of highlights and rim.");
-        return medium;
-    }
+    const ShellGrid shells = make_shells(samples.step_px, extent, options.shell_count);
 
-    std::array<PiecewiseProfile, 3> pieces;
-    for (int c = 0; c < 3; ++c) {
-        const auto k = static_cast<std::size_t>(c);
-        pieces[k] = options.solver == ProfileSolver::Qmr
+    // How much more a curved body passes depends on the albedo that is being looked for.
+    std::vector<CurvedBodyFactor> factors;
+    if (options.use_curved_body) factors.assign(3, curved_body_factor(0.5));
+    const int rounds = options.use_curved_body ? 3 : 1;
+    for (int round = 0; round < rounds; ++round) {
+        const DistanceHistogram histogram(observations, samples, source, local, factors);
+        const bool is_last = round + 1 == rounds;
+        std::array<PiecewiseProfile, 3> pieces;
+        if (is_last || options.solver == ProfileSolver::Qmr) {
+            medium.piecewise = {};
+            for (int c = 0; c < 3; ++c) {
+                pieces[static_cast<std::size_t>(c)] =
+                    options.solver == ProfileSolver::Qmr
                         ? fit_piecewise_qmr(histogram, exitance.col(c), c, fit_options)
                         : fit_piecewise_monotone(histogram, exitance.col(c), c, fit_options);
-    }
-    const ShellGrid shells = make_shells(samples.step_px, diameter, options.shell_count);
-    for (int k = 0; k < options.shell_count; ++k) {
-        const auto i = static_cast<std::size_t>(k);
-        medium.piecewise.r.push_back(0.5 * (shells.edge[i] + shells.edge[i + 1]));
-        medium.piecewise.rd.push_back(
-            Rgbd(pieces[0].value[k], pieces[1].value[k], pieces[2].value[k]));
-    }
-    progress.update(0.7, "material: step profile");
-
-    if (options.solver == ProfileSolver::Qmr) {
-        for (std::size_t c = 0; c < 3; ++c)
-            medium.fit[c] = fit_exponentials_to_shells(shells, pieces[c].value, fit_options);
-    } else if (options.coupling == ChannelCoupling::Free) {
-        for (int c = 0; c < 3; ++c)
-            medium.fit[static_cast<std::size_t>(c)] =
-                fit_exponentials(histogram, exitance.col(c), c, fit_options);
-    } else {
-        medium.fit = fit_ordered(histogram, exitance, fit_options);
-    }
-    for (int c = 0; c < 3; ++c) {
-        const TwoExponentials& fit = medium.fit[static_cast<std::size_t>(c)];
-        const VectorXd model = histogram.image_of(fit).col(c);
-        const double mean_exitance = exitance.col(c).mean();
-        medium.channels[static_cast<std::size_t>(c)].relative_residual =
-            std::sqrt((model - exitance.col(c)).squaredNorm() / static_cast<double>(model.size())) /
-            std::max(mean_exitance, 1e-9);
-        judge(medium, c, fit_options.longest_px, mean_exitance / kPi);
+            }
+            for (int k = 0; k < options.shell_count; ++k) {
+                const auto i = static_cast<std::size_t>(k);
+                medium.piecewise.r.push_back(0.5 * (shells.edge[i] + shells.edge[i + 1]));
+                medium.piecewise.rd.push_back(
+                    Rgbd(pieces[0].value[k], pieces[1].value[k], pieces[2].value[k]));
+            }
+        }
+        if (options.solver == ProfileSolver::Qmr) {
+            for (std::size_t c = 0; c < 3; ++c)
+                medium.fit[c] = fit_exponentials_to_shells(shells, pieces[c].value, fit_options);
+        } else if (options.coupling == ChannelCoupling::Free) {
+            for (int c = 0; c < 3; ++c) {
+                medium.fit[static_cast<std::size_t>(c)] =
+                    fit_exponentials(histogram, exitance.col(c), c, fit_options);
+            }
+        } else {
+            medium.fit = fit_ordered(histogram, exitance, fit_options);
+        }
+        if (!is_last) {
+            factors = body_factors(medium);
+            continue;
+        }
+        for (int c = 0; c < 3; ++c) {
+            const TwoExponentials& fit = medium.fit[static_cast<std::size_t>(c)];
+            const VectorXd model = histogram.image_of(fit).col(c);
+            const double mean_exitance = exitance.col(c).mean();
+            medium.channels[static_cast<std::size_t>(c)].relative_residual =
+                std::sqrt((model - exitance.col(c)).squaredNorm() /
+                          static_cast<double>(model.size())) /
+                std::max(mean_exitance, 1e-9);
+            judge(medium, c, fit_options.longest_px, mean_exitance / kPi);
+        }
     }
     equivalent_media(medium);
-    progress.update(1.0, "material: done");
     return medium;
+}
+
+double total_residual(const MediumEstimate& medium) {
+    double sum = 0;
+    for (const ChannelFit& channel : medium.channels)
+        if (channel.outcome != Outcome::NotIdentifiable) sum += channel.relative_residual;
+    return sum;
+}
+
+}  // namespace
+
+MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                               const EnteringLight& light, const BssrdfOptions& options,
+                               const Progress& progress) {
+    if (options.transmittance != Transmittance::Auto) {
+        return fit_medium(diffuse, relief, excluded, light,
+                          options.transmittance == Transmittance::Fresnel, options);
+    }
+    MediumEstimate fresnel = fit_medium(diffuse, relief, excluded, light, true, options);
+    progress.update(0.5, "material: with Fresnel");
+    MediumEstimate plain = fit_medium(diffuse, relief, excluded, light, false, options);
+    progress.update(1.0, "material: done");
+    return total_residual(plain) < total_residual(fresnel) ? plain : fresnel;
+}
+
+MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                               const ViewLights& lights, const BssrdfOptions& options,
+                               const Progress& progress) {
+    const EnteringLight light = [&](const SurfacePoints& points, double eta) {
+        return entering_light(relief, points, lights, eta, options.use_shadows);
+    };
+    return estimate_bssrdf(diffuse, relief, excluded, light, options, progress);
 }
 
 double limit_albedo(MediumEstimate& medium) {

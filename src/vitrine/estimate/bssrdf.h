@@ -6,9 +6,11 @@
 #include "estimate/estimate.h"
 #include "optics/dipole.h"
 #include "optics/radial_profile.h"
+#include "render/relief_light.h"
 #include "scene/relief.h"
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -26,6 +28,14 @@ enum class ChannelCoupling {
     Ordered,  ///< same scattering, different absorption: the darker channel is the narrower one
 };
 
+/// What the surface lets through. A dielectric's Fresnel transmittance is the physical choice;
+/// rough and layered skins, and many renderers, have none to speak of.
+enum class Transmittance {
+    Auto,     ///< whichever explains the picture with the smaller residual
+    Fresnel,  ///< of index `eta`, as in the paper
+    None,
+};
+
 struct BssrdfOptions {
     ProfileSolver solver = ProfileSolver::Monotone;
     ChannelCoupling coupling = ChannelCoupling::Ordered;
@@ -35,10 +45,12 @@ struct BssrdfOptions {
     int shell_count = 24;         ///< steps of the piecewise constant profile
     double longest =
         1.0 / 3.0;  ///< bound of 1/|b|, in diameters: shape errors look like infinite tails
-    double smoothing = 0.03;  ///< of the picture before the fit, in inradii: removes texture
-    double ridge = 1e-4;      ///< Tikhonov weight of the piecewise profile
-    bool use_shadows = true;  ///< the object's own cast shadows
-    std::uint64_t seed = 1;   ///< of the choice of pixels
+    double smoothing = 0.03;      ///< of the picture before the fit, in inradii: removes texture
+    double ridge = 1e-4;          ///< Tikhonov weight of the piecewise profile
+    bool use_shadows = true;      ///< the object's own cast shadows
+    bool use_curved_body = true;  ///< optics/curved_body.h; false: the flat R_d, as published
+    Transmittance transmittance = Transmittance::Auto;
+    std::uint64_t seed = 1;  ///< of the choice of pixels
 };
 
 struct ChannelFit {
@@ -57,6 +69,7 @@ struct MediumEstimate {
     std::array<ChannelFit, 3> channels;
     std::array<std::optional<DipoleMedium>, 3> dipole;  ///< per pixel; none where it cannot be one
     double eta = 1.3;
+    bool is_fresnel = true;  ///< which transmittance explained the picture better
     double inradius_px = 1;
     std::vector<std::string> warnings;
 
@@ -68,8 +81,19 @@ struct MediumEstimate {
 /// non-negative and falling while it is solved, and the two exponentials are fitted to the image
 /// by variable projection over their lengths, not to the steps (which biases the width by -15 %).
 /// Costs about 0.3 s. `excluded`: highlights.
+///
+/// Beyond the paper: a closed body passes more light than the flat R_d says (curved_body.h, found
+/// in rounds with the albedo), and the surface's transmittance is chosen by the residual.
 MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
                                const ViewLights& lights, const BssrdfOptions& options = {},
+                               const Progress& progress = {});
+
+/// Irradiance that enters at points of the relief, through a surface of index eta (1: none).
+using EnteringLight = std::function<std::vector<Rgb>(const SurfacePoints& points, double eta)>;
+
+/// The same under any light, near lamps and bounced light included.
+MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
+                               const EnteringLight& light, const BssrdfOptions& options = {},
                                const Progress& progress = {});
 
 /// Light and albedo share one unknown factor. Where the brightest channel would reflect more than

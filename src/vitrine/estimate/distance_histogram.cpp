@@ -32,6 +32,7 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
     for (std::size_t i = 0; i < relief.mask.size(); ++i) {
         if (relief.mask[i] <= 127 || (!excluded.empty() && excluded[i] > 127)) continue;
         if (rim[i] <= rim_px || relief.normals[i].z() <= min_cos) continue;
+        if (relief.is_cluster() && relief.ball_of[i] < 0) continue;
         usable.push_back(i);
     }
     Rng rng(seed);
@@ -49,6 +50,7 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
         observations.position.push_back(
             relief.point(static_cast<int>(i % width), static_cast<int>(i / width)));
         observations.normal.push_back(relief.normals[i]);
+        if (relief.is_cluster()) observations.ball.push_back(relief.ball_of[i]);
     }
     return observations;
 }
@@ -56,7 +58,8 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
 DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
                                      const ReliefSamples& samples,
                                      const Eigen::MatrixXf& source_values,
-                                     const Eigen::MatrixXf& local_values)
+                                     const Eigen::MatrixXf& local_values,
+                                     const std::vector<CurvedBodyFactor>& body)
     : step_(samples.step_px),
       observation_count_(observations.position.size()),
       field_count_(source_values.cols()),
@@ -77,10 +80,18 @@ DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
     const std::size_t fields = static_cast<std::size_t>(field_count_);
     const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values =
         source_values;
+    Eigen::RowVectorXf linear = Eigen::RowVectorXf::Zero(field_count_), quadratic = linear;
+    for (Eigen::Index l = 0; l < field_count_ && !body.empty(); ++l) {
+        const CurvedBodyFactor& factor = body[body.size() == 1 ? 0 : static_cast<std::size_t>(l)];
+        linear[l] = static_cast<float>(factor.linear);
+        quadratic[l] = static_cast<float>(factor.quadratic);
+    }
     sums_.assign(observation_count_ * nodes_.size() * fields, 0.0f);
     parallel_for(observation_count_, 8, [&](std::size_t p) {
         float* block = &sums_[p * nodes_.size() * fields];
+        Eigen::RowVectorXf row(field_count_);
         for (std::size_t i = 0; i < samples.position.size(); ++i) {
+            if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
             const double r = (samples.position[i] - observations.position[p]).norm();
             const double place = std::log1p(r * kGrowth / (step_ * kFirst)) / kGrowth;
             const std::size_t k = std::min(static_cast<std::size_t>(place), nodes_.size() - 2);
@@ -88,7 +99,11 @@ DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
                 std::clamp((r - nodes_[k]) / (nodes_[k + 1] - nodes_[k]), 0.0, 1.0));
             Eigen::Map<Eigen::RowVectorXf> lower(block + k * fields, field_count_);
             Eigen::Map<Eigen::RowVectorXf> upper(block + (k + 1) * fields, field_count_);
-            const auto row = values.row(static_cast<Eigen::Index>(i));
+            row = values.row(static_cast<Eigen::Index>(i));
+            const float rise = chord_rise(samples.position[i], samples.normal[i],
+                                          observations.position[p], observations.normal[p]);
+            if (rise > 0 && !body.empty())
+                row.array() *= 1 + rise * (linear.array() + rise * quadratic.array());
             lower += (1 - t) * row;
             upper += t * row;
         }

@@ -2,6 +2,7 @@
 // the image of any radial kernel is a small product: what makes every fit take milliseconds.
 #pragma once
 
+#include "optics/curved_body.h"
 #include "render/translucent_samples.h"
 
 #include <Eigen/Core>
@@ -35,6 +36,7 @@ struct ReliefObservations {
     std::vector<Vec3f> position;
     std::vector<Vec3f> normal;
     std::vector<std::size_t> pixel;
+    std::vector<std::int16_t> ball;  ///< of a cluster; empty for one body
 };
 
 /// Draws `count` pixels without replacement from the mask minus `excluded` minus a rim of
@@ -42,14 +44,17 @@ struct ReliefObservations {
 ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
                                      double rim_px, double min_cos, std::uint64_t seed);
 
-/// For L source fields at once: node k of observation p holds sum_i hat_k(r_pi) value(i, l), the
-/// sources spread onto the two radial nodes around their distance.
+/// For L source fields at once: node k of observation p holds sum_i hat_k(r_pi) C(s_pi)
+/// value(i, l), the sources spread onto the two radial nodes around their distance. On a cluster
+/// only sources of the same ball count.
 class DistanceHistogram {
   public:
     /// @param source_values samples x L: entering irradiance times area, per sample and field
     /// @param local_values observations x L: entering irradiance at the observation itself
+    /// @param body one factor per field, or one for all; empty: as if flat
     DistanceHistogram(const ReliefObservations& observations, const ReliefSamples& samples,
-                      const Eigen::MatrixXf& source_values, const Eigen::MatrixXf& local_values);
+                      const Eigen::MatrixXf& source_values, const Eigen::MatrixXf& local_values,
+                      const std::vector<CurvedBodyFactor>& body = {});
 
     /// Column l: the exitance sum_i R(r_pi) E_i dA_i of field l at each observation. What lies
     /// nearer than 1.5 cells is split as in the renderer: a Gaussian cap from the samples, the

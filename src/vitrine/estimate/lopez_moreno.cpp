@@ -202,21 +202,14 @@ ViewLightsEstimate estimate_lopez_moreno_lights(const ImageRgb& diffuse, const R
         [](const ViewLight& a, const ViewLight& b) { return a.intensity[0] > b.intensity[0]; });
     result.lights.ambient =
         Rgbd::Constant(contour.ambient + best.intensity[static_cast<Index>(best.direction.size())]);
-    const double total = result.lights.total();
-    if (total <= 0) {
+    if (result.lights.total() <= 0) {
         result.lights.ambient = Rgbd::Constant(kPi);
         result.outcome = Outcome::NotIdentifiable;
         result.reason = "the contour is black";
         return result;
     }
-    result.ambient_share = luminance(result.lights.ambient) / total;
     result.relative_residual = best.rms / std::max(mean(contour.luminance), 1e-9);
-    normalise_lights(result.lights, relief, options.eta);
-    if (result.ambient_share > 0.6) {
-        result.warnings.push_back(
-            "Flat light: most of it comes from everywhere, so how translucent the material is "
-            "stays uncertain.");
-    }
+    normalise_and_warn(result, relief, options.eta);
     return result;
 }
 

@@ -7,6 +7,7 @@
 #include "image/filter.h"
 #include "math/nnls.h"
 #include "math/statistics.h"
+#include "render/relief_light.h"
 
 #include <numeric>
 
@@ -16,6 +17,11 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+/// Of wax, milk, marble and flesh; C(s) changes little around it.
+constexpr double kTypicalAlbedo = 0.6;
+/// Light thrown back by the ground is common, but dearer than a lamp: it must earn its place.
+constexpr double kGroundPrice = 2.0;
 
 /// The picture as the fit sees it: luminance over what leaves the surface, mean 1.
 VectorXd observed_exitance(const ImageRgb& diffuse, const ReliefObservations& observations,
@@ -34,38 +40,54 @@ VectorXd observed_exitance(const ImageRgb& diffuse, const ReliefObservations& ob
 struct Fields {
     Eigen::MatrixXf source, local;
 };
-Fields light_fields(const Relief& relief, const ReliefSamples& samples,
-                    const ReliefObservations& observations, const std::vector<Vec3>& directions,
-                    const TranslucencyLightOptions& options) {
+
+/// Columns: the directions, then (unless `sky` is null) light from everywhere and from below.
+void fill_fields(Eigen::MatrixXf& field, const Relief& relief, const SurfacePoints& points,
+                 const std::vector<Vec3>& directions, const SkyShares* sky,
+                 const TranslucencyLightOptions& options) {
     const auto count = static_cast<Index>(directions.size());
-    Fields fields{Eigen::MatrixXf(static_cast<Index>(samples.position.size()), count + 1),
-                  Eigen::MatrixXf(static_cast<Index>(observations.position.size()), count + 1)};
-    parallel_for(directions.size(), 1, [&](std::size_t l) {
-        const auto column = static_cast<Index>(l);
-        std::vector<float> seen, seen_local;
-        if (options.use_shadows) {
-            seen = visibility(relief, samples.position, samples.normal, directions[l]);
-            seen_local =
-                visibility(relief, observations.position, observations.normal, directions[l]);
+    const auto rows = static_cast<Index>(points.position.size());
+    field.resize(rows, count + (sky == nullptr ? 0 : 2));
+    for (Index l = 0; l < count; ++l) {
+        const Vec3& direction = directions[static_cast<std::size_t>(l)];
+        std::vector<float> seen(points.position.size(), 1.0f);
+        if (options.use_shadows) seen = visibility(relief, points, direction);
+        for (Index i = 0; i < rows; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            field(i, l) = seen[k] * static_cast<float>(entering_irradiance(points.normal[k],
+                                                                           direction, options.eta));
         }
-        for (std::size_t i = 0; i < samples.position.size(); ++i) {
-            fields.source(static_cast<Index>(i), column) =
-                static_cast<float>(
-                    entering_irradiance(samples.normal[i], directions[l], options.eta)) *
-                samples.area_px2[i] * (seen.empty() ? 1.0f : seen[i]);
-        }
-        for (std::size_t p = 0; p < observations.position.size(); ++p) {
-            fields.local(static_cast<Index>(p), column) =
-                static_cast<float>(
-                    entering_irradiance(observations.normal[p], directions[l], options.eta)) *
-                (seen_local.empty() ? 1.0f : seen_local[p]);
-        }
-    });
-    for (std::size_t i = 0; i < samples.position.size(); ++i)
-        fields.source(static_cast<Index>(i), count) = samples.area_px2[i];
-    fields.local.col(count).setOnes();
-    return fields;
+    }
+    if (sky == nullptr) return;
+    for (Index i = 0; i < rows; ++i) {
+        field(i, count) = sky->ambient[static_cast<std::size_t>(i)];
+        field(i, count + 1) = sky->below[static_cast<std::size_t>(i)];
+    }
 }
+
+/// What the fit knows of the object: where light enters and where it is seen.
+struct Body {
+    const Relief& relief;
+    const ReliefSamples& samples;
+    const ReliefObservations& observations;
+    SkyShares sample_sky, observation_sky;
+
+    SurfacePoints sample_points() const { return {samples.position, samples.normal, samples.ball}; }
+    SurfacePoints observation_points() const {
+        return {observations.position, observations.normal, observations.ball};
+    }
+    Fields fields(const std::vector<Vec3>& directions, bool with_sky,
+                  const TranslucencyLightOptions& options) const {
+        Fields result;
+        fill_fields(result.source, relief, sample_points(), directions,
+                    with_sky ? &sample_sky : nullptr, options);
+        fill_fields(result.local, relief, observation_points(), directions,
+                    with_sky ? &observation_sky : nullptr, options);
+        for (Index i = 0; i < result.source.rows(); ++i)
+            result.source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
+        return result;
+    }
+};
 
 /// Weighted ridge NNLS for one kernel's image of all lights.
 struct Fit {
@@ -107,15 +129,20 @@ VectorXd robust_weights(const MatrixXd& image, const VectorXd& intensity, const 
 class KernelImage {
   public:
     KernelImage(const ReliefObservations& observations, const ReliefSamples& samples,
-                const RadialKernel& kernel)
+                const RadialKernel& kernel, const CurvedBodyFactor& body)
         : far_(static_cast<Index>(observations.position.size()),
                static_cast<Index>(samples.position.size())) {
         const CappedKernel capped(kernel, 1.5 * samples.step_px);
         near_ = capped.near_share();
         parallel_for(observations.position.size(), 8, [&](std::size_t p) {
             for (std::size_t i = 0; i < samples.position.size(); ++i) {
-                far_(static_cast<Index>(p), static_cast<Index>(i)) = static_cast<float>(
-                    capped((samples.position[i] - observations.position[p]).norm()));
+                float& entry = far_(static_cast<Index>(p), static_cast<Index>(i));
+                entry = 0;
+                if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
+                const float rise = chord_rise(samples.position[i], samples.normal[i],
+                                              observations.position[p], observations.normal[p]);
+                entry = static_cast<float>(
+                    capped((samples.position[i] - observations.position[p]).norm()) * body(rise));
             }
         });
     }
@@ -173,51 +200,69 @@ std::vector<ViewLight> merge_lights(const std::vector<Vec3>& directions, const V
     return lights;
 }
 
-}  // namespace
-
-std::vector<Vec3> fibonacci_directions(int count, double z_min) {
-    std::vector<Vec3> directions;
-    const double golden = kPi * (3 - std::sqrt(5.0));
-    for (int i = 0; i < count; ++i) {
-        const double z = 1 - (1 - z_min) * (i + 0.5) / count;
-        const double rho = std::sqrt(std::max(0.0, 1 - z * z));
-        directions.emplace_back(rho * std::cos(golden * i), rho * std::sin(golden * i), z);
+/// Where several highlights agree on a lamp, that is where it is: lights near it go there.
+/// @returns which lights are held
+std::vector<bool> snap_to_highlights(std::vector<ViewLight>& lights,
+                                     std::span<const HighlightLight> highlight_lights,
+                                     double reach_deg) {
+    std::vector<bool> is_held(lights.size(), false);
+    for (std::size_t h = 0; h < highlight_lights.size(); ++h) {
+        if (highlight_lights[h].votes < 2) continue;
+        std::size_t nearest = lights.size();
+        double best = reach_deg;
+        for (std::size_t l = 0; l < lights.size(); ++l) {
+            const double apart =
+                degrees(angle_between(lights[l].direction, highlight_lights[h].direction));
+            if (apart >= best || is_held[l]) continue;
+            best = apart;
+            nearest = l;
+        }
+        if (nearest == lights.size()) continue;
+        lights[nearest].direction = highlight_lights[h].direction;
+        is_held[nearest] = true;
     }
-    return directions;
+    return is_held;
 }
 
-std::vector<float> visibility(const Relief& relief, std::span<const Vec3f> positions,
-                              std::span<const Vec3f> normals, const Vec3& direction) {
-    const Vec3f w = direction.cast<float>();
-    const auto radius = static_cast<float>(relief.inradius_px);
-    const float step = std::max(1.0f, 0.05f * radius);
-    const float flat = std::hypot(w.x(), w.y());
-    std::vector<float> seen(positions.size(), 1.0f);
-    for (std::size_t i = 0; i < positions.size(); ++i) {
-        if (normals[i].dot(w) <= 0) {
-            seen[i] = 0;
-            continue;
-        }
-        // Clear of the surface first: samples and depth differ by a cell.
-        const Vec3f start = positions[i] + 0.06f * radius * normals[i];
-        for (int k = 1; k < 200; ++k) {
-            const Vec3f p = start + (static_cast<float>(k) * step / std::max(flat, 0.2f)) * w;
-            if (std::abs(p.z()) > 1.6f * radius) break;
-            const int x = static_cast<int>(std::lround(p.x()));
-            const int y = static_cast<int>(std::lround(-p.y()));
-            if (!relief.mask.contains(x, y)) break;
-            if (is_inside(relief.mask, x, y) && std::abs(p.z()) < relief.depth_px(x, y)) {
-                seen[i] = 0;
-                break;
-            }
+/// Mean colour of what surrounds the lower half of the object, luminance 1: what the ground throws
+/// back. White where nothing is seen there.
+Rgbd ground_colour(const ImageRgb& picture, const Relief& relief) {
+    const ImageF away = distance_to(relief.mask);
+    double row_sum = 0, count = 0;
+    for (int y = 0; y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x) {
+            if (!is_inside(relief.mask, x, y)) continue;
+            row_sum += y;
+            count += 1;
         }
     }
-    return seen;
+    Rgbd sum = Rgbd::Zero();
+    for (int y = static_cast<int>(row_sum / std::max(count, 1.0)); y < picture.height(); ++y) {
+        for (int x = 0; x < picture.width(); ++x) {
+            const float d = away(x, y);
+            if (d > 3 && d < static_cast<float>(relief.inradius_px))
+                sum += picture(x, y).cast<double>();
+        }
+    }
+    const double y = luminance(sum);
+    return y > 1e-6 ? (sum / y).eval() : Rgbd::Ones().eval();
+}
+
+}  // namespace
+
+void normalise_and_warn(ViewLightsEstimate& estimate, const Relief& relief, double eta) {
+    estimate.ambient_share = luminance(estimate.lights.ambient) / estimate.lights.total();
+    normalise_lights(estimate.lights, relief, eta);
+    if (estimate.ambient_share > 0.6) {
+        estimate.warnings.push_back(
+            "Flat light: most of it comes from everywhere, so how translucent the material is "
+            "stays uncertain.");
+    }
 }
 
 ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const Relief& relief,
                                                 const Mask& excluded,
-                                                std::span<const ViewLight> highlight_lights,
+                                                std::span<const HighlightLight> highlight_lights,
                                                 const TranslucencyLightOptions& options,
                                                 const Progress& progress) {
     ViewLightsEstimate result;
@@ -234,6 +279,11 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     const VectorXd y = observed_exitance(diffuse, observations, options.eta);
     const VectorXd weight = y.cwiseMax(0.2).cwiseInverse();
     const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
+    Body body{relief, samples, observations, {}, {}};
+    body.sample_sky = sky_shares(relief, body.sample_points());
+    body.observation_sky = sky_shares(relief, body.observation_points());
+    const CurvedBodyFactor factor =
+        options.use_curved_body ? curved_body_factor(kTypicalAlbedo) : CurvedBodyFactor{};
 
     std::vector<Vec3> directions = fibonacci_directions(options.direction_count, -0.97);
     const std::size_t first_highlight = directions.size();
@@ -244,16 +294,17 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     // Softness steers which kernels are tried and how dear ambient light is.
     const double s = std::clamp(options.softness, 0.0, 1.0);
     const double g_low = 0.02 * std::pow(4.0, s) * radius, g_high = 0.1 * std::pow(6.0, s) * radius;
-    VectorXd price(count + 1);
+    VectorXd price(count + 2);
     for (Index l = 0; l < count; ++l) {
         const Vec3& w = directions[static_cast<std::size_t>(l)];
         price[l] = options.direction_penalty * (1 + 3 * std::max(0.0, -w.z()));
         if (static_cast<std::size_t>(l) >= first_highlight) price[l] *= options.highlight_discount;
     }
     price[count] = options.direction_penalty * std::pow(12.0, s);
+    price[count + 1] = options.use_ground ? options.direction_penalty * kGroundPrice : 1e3;
 
-    const Fields fields = light_fields(relief, samples, observations, directions, options);
-    const DistanceHistogram histogram(observations, samples, fields.source, fields.local);
+    const Fields fields = body.fields(directions, true, options);
+    const DistanceHistogram histogram(observations, samples, fields.source, fields.local, {factor});
     progress.update(0.4, "lights: light fields");
 
     constexpr int kWidths = 5;
@@ -293,31 +344,36 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
                                         options.merge_deg, options.max_lights);
 
-    // Directions move freely now, intensities follow: pattern search on the sphere.
+    const std::vector<bool> is_held =
+        snap_to_highlights(result.lights.lights, highlight_lights, options.merge_deg);
+
+    // The others move freely now, intensities follow: pattern search on the sphere.
     std::vector<Vec3> few;
     for (const ViewLight& light : result.lights.lights) few.push_back(light.direction);
-    const KernelImage image_of(observations, samples, [&](double r) {
-        return choice.mix * exponential(w1)(r) + (1 - choice.mix) * exponential(w2)(r);
-    });
-    const MatrixXd ambient_column =
-        image_of(light_fields(relief, samples, observations, {}, options));
+    const KernelImage image_of(
+        observations, samples,
+        [&](double r) {
+            return choice.mix * exponential(w1)(r) + (1 - choice.mix) * exponential(w2)(r);
+        },
+        factor);
+    const MatrixXd sky_columns = image_of(body.fields({}, true, options));
     const auto column_of = [&](const Vec3& direction) -> VectorXd {
-        return image_of(light_fields(relief, samples, observations, {direction}, options)).col(0);
+        return image_of(body.fields({direction}, false, options)).col(0);
     };
     const auto solve = [&](const MatrixXd& columns, const std::vector<Vec3>& trial,
                            const VectorXd& weights) {
-        VectorXd few_price(static_cast<Index>(trial.size()) + 1);
+        VectorXd few_price(static_cast<Index>(trial.size()) + 2);
         for (std::size_t l = 0; l < trial.size(); ++l) {
             few_price[static_cast<Index>(l)] =
                 0.3 * options.direction_penalty * (1 + 3 * std::max(0.0, -trial[l].z()));
         }
-        few_price[static_cast<Index>(trial.size())] = price[count];
+        few_price.tail<2>() = price.tail<2>();
         return fit_intensities(columns, y, weights, few_price);
     };
-    MatrixXd few_image(y.size(), static_cast<Index>(few.size()) + 1);
+    MatrixXd few_image(y.size(), static_cast<Index>(few.size()) + 2);
     for (std::size_t l = 0; l < few.size(); ++l)
         few_image.col(static_cast<Index>(l)) = column_of(few[l]);
-    few_image.col(static_cast<Index>(few.size())) = ambient_column.col(0);
+    few_image.rightCols<2>() = sky_columns;
     const VectorXd few_weight =
         robust_weights(few_image, solve(few_image, few, weight).intensity, y, weight);
     Fit final_fit = solve(few_image, few, few_weight);
@@ -337,6 +393,7 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         for (int round = 0; round < 4; ++round) {
             bool has_moved = false;
             for (std::size_t l = 0; l < few.size(); ++l) {
+                if (is_held[l]) continue;
                 const Vec3 side = few[l].unitOrthogonal(), up = few[l].cross(side);
                 for (int k = 0; k < 6; ++k) {
                     const double turn = k * kPi / 3;
@@ -359,28 +416,23 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     });
     result.lights.lights = std::move(kept);
     result.lights.ambient = Rgbd::Constant(final_fit.intensity[static_cast<Index>(few.size())]);
+    result.lights.from_below =
+        ground_colour(diffuse, relief) * final_fit.intensity[static_cast<Index>(few.size()) + 1];
     const VectorXd misfit = weight.cwiseProduct(few_image * final_fit.intensity - y);
     result.relative_residual = std::sqrt(misfit.squaredNorm() / static_cast<double>(misfit.size()));
-    const double total = result.lights.total();
-    if (total <= 0) {
+    if (result.lights.total() <= 0) {
         result.lights.ambient = Rgbd::Constant(kPi);
         result.outcome = Outcome::NotIdentifiable;
         result.reason = "no light explains the picture";
         return result;
     }
-    result.ambient_share = luminance(result.lights.ambient) / total;
-    normalise_lights(result.lights, relief, options.eta);
+    normalise_and_warn(result, relief, options.eta);
     if (result.relative_residual > 0.25) {
         result.outcome = Outcome::Ambiguous;
         result.reason = "the lighting could not be explained well";
         result.warnings.push_back(
             fmt::format("The lighting could not be explained: the best model is off by {:.0f} %.",
                         100 * result.relative_residual));
-    }
-    if (result.ambient_share > 0.6) {
-        result.warnings.push_back(
-            "Flat light: most of it comes from everywhere, so how translucent the material is "
-            "stays uncertain.");
     }
     return result;
 }

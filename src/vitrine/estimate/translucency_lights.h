@@ -3,6 +3,7 @@
 
 #include "base/progress.h"
 #include "estimate/estimate.h"
+#include "estimate/highlight_light.h"
 #include "scene/relief.h"
 
 #include <span>
@@ -24,9 +25,11 @@ struct TranslucencyLightOptions {
     double highlight_discount = 0.3;  ///< factor on the price of directions seen as highlights
     double merge_deg = 40.0;          ///< lights closer than this become one
     int max_lights = 3;
-    double polish_deg = 8.0;  ///< first step of the search for better directions; 0: none
-    bool use_shadows = true;  ///< the object's own cast shadows
-    std::uint64_t seed = 1;   ///< of the choice of pixels
+    double polish_deg = 8.0;      ///< first step of the search for better directions; 0: none
+    bool use_shadows = true;      ///< the object's own cast shadows
+    bool use_curved_body = true;  ///< optics/curved_body.h, at the albedo kTypicalAlbedo
+    bool use_ground = true;       ///< light thrown back by what the object stands on
+    std::uint64_t seed = 1;       ///< of the choice of pixels
 };
 
 struct ViewLightsEstimate {
@@ -43,20 +46,18 @@ struct ViewLightsEstimate {
 ///
 /// For a fixed kernel the picture is linear in the lights; kernels K = m k(g1) + (1 - m) k(g2),
 /// k(g) exponential in r / g, are tried on a grid and the best explained picture wins. Directions
-/// are then merged and intensities solved again. Replaces Lopez-Moreno et al. 2010, which assumes
-/// Lambertian shading and fails on translucent things: light from behind reads as ambient there.
-/// Costs about 0.5 s. `excluded`: highlights.
+/// are then merged, lights on which several highlights agree are held there, the others move to
+/// where they explain most; light from everywhere and from below (with the colour of the ground
+/// beside the object) is estimated along with them. Replaces Lopez-Moreno et al. 2010, which
+/// assumes Lambertian shading and fails on translucent things: light from behind reads as ambient
+/// there. Costs about 0.5 s. `excluded`: highlights.
 ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const Relief& relief,
                                                 const Mask& excluded,
-                                                std::span<const ViewLight> highlight_lights,
+                                                std::span<const HighlightLight> highlight_lights,
                                                 const TranslucencyLightOptions& options = {},
                                                 const Progress& progress = {});
 
-/// Directions spread evenly over the sphere (Fibonacci lattice) with z > z_min.
-std::vector<Vec3> fibonacci_directions(int count, double z_min);
-
-/// 1 where `sample` sees the light, 0 where the (mirrored) object itself is in the way.
-std::vector<float> visibility(const Relief& relief, std::span<const Vec3f> positions,
-                              std::span<const Vec3f> normals, const Vec3& direction);
+/// Scales the lights as ViewLights wants them, and says so when most light comes from everywhere.
+void normalise_and_warn(ViewLightsEstimate& estimate, const Relief& relief, double eta);
 
 }  // namespace vitrine

@@ -5,8 +5,10 @@
 #include "estimate/highlights.h"
 #include "estimate/lopez_moreno.h"
 #include "estimate/profile_fit.h"
+#include "estimate/relief_refinement.h"
 #include "estimate/translucency_lights.h"
 #include "estimate/translucent_world.h"
+#include "reconstruct/relief.h"
 
 #include <gtest/gtest.h>
 
@@ -58,7 +60,8 @@ TEST(DistanceHistogram, GivesThePictureOfTheRenderer) {
     Eigen::MatrixXf local(static_cast<Eigen::Index>(observations.pixel.size()), 1);
     for (std::size_t p = 0; p < observations.pixel.size(); ++p)
         local(static_cast<Eigen::Index>(p), 0) = irradiance.front[observations.pixel[p]][0];
-    const DistanceHistogram histogram(observations, samples, source, local);
+    const DistanceHistogram histogram(observations, samples, source, local,
+                                      {curved_body_factor(fit.total())});
     const Eigen::VectorXd image = histogram.image_of(fit).col(0);
     TranslucentRenderOptions options;
     options.eta = 1;  // no loss on the way out: exitance / pi
@@ -188,12 +191,120 @@ TEST(Highlights, SpotIsFoundFilledAndPointsToItsLamp) {
     }
     const Highlights found = find_highlights(photo, world.relief.mask, 1.0);
     ASSERT_EQ(found.blobs.size(), 1u);
-    const std::vector<ViewLight> lights = highlight_lights(found, world.relief);
+    const std::vector<HighlightLight> lights = highlight_lights(found, world.relief);
     EXPECT_LT(degrees(angle_between(lights[0].direction, lamp)), 4);
     double worst = 0;
     for (std::size_t i = 0; i < photo.size(); ++i)
         worst = std::max<double>(worst, (found.diffuse[i] - world.diffuse[i]).abs().maxCoeff());
     EXPECT_LT(worst, 0.12);
+}
+
+TEST(HighlightLights, SpotsOfOneLampVoteTogether) {
+    const Relief relief = ellipsoid(220, 100, 80);
+    // Three spots: two where a key lamp mirrors (one a little off), one of another lamp.
+    const auto pixel_of = [&](const Vec3& lamp) {
+        const Vec3 half = (lamp + Vec3(0, 0, 1)).normalized();
+        std::size_t best = 0;
+        for (std::size_t i = 0; i < relief.mask.size(); ++i) {
+            if (relief.mask[i] > 127 && relief.normals[i].cast<double>().dot(half) >
+                                            relief.normals[best].cast<double>().dot(half)) {
+                best = i;
+            }
+        }
+        return best;
+    };
+    const Vec3 key = Vec3(-0.5, 0.55, 0.67).normalized(), other = Vec3(0.8, 0.3, -0.4).normalized();
+    Highlights highlights;
+    highlights.core = Mask(220, 220);
+    highlights.residual = ImageRgb(220, 220);
+    for (const Vec3& lamp : {key, Vec3(-0.48, 0.63, 0.62).normalized(), other}) {
+        HighlightBlob blob;
+        blob.pixels = {pixel_of(lamp)};
+        blob.weight = lamp == other ? 3 : 2;
+        highlights.core[blob.pixels[0]] = 255;
+        highlights.residual[blob.pixels[0]] = Rgb::Ones();
+        highlights.blobs.push_back(blob);
+    }
+    const std::vector<HighlightLight> lights = highlight_lights(highlights, relief);
+    ASSERT_EQ(lights.size(), 2u);
+    EXPECT_EQ(lights[0].votes, 2);  // together heavier than the single one
+    EXPECT_LT(degrees(angle_between(lights[0].direction, key)), 6);
+    EXPECT_EQ(lights[1].votes, 1);
+    EXPECT_LT(degrees(angle_between(lights[1].direction, other)), 4);
+}
+
+TEST(TranslucencyLights, LampOfTwoHighlightsIsHeld) {
+    const World world;
+    HighlightLight lamp;
+    lamp.direction = Vec3(-0.45, 0.6, 0.66).normalized();  // 4 degrees from the true one
+    lamp.votes = 2;
+    const std::vector<HighlightLight> lamps = {lamp};
+    const auto found = estimate_translucency_lights(world.diffuse, world.relief, Mask(), lamps);
+    EXPECT_LT(nearest_deg(found.lights, lamp.direction), 1e-6);
+}
+
+TEST(TranslucencyLights, GroundIsFoundWhereItShines) {
+    World world;
+    world.lights.from_below = Rgbd::Constant(0.8);
+    world.diffuse =
+        TranslucentRelief(world.relief)
+            .render(irradiance_from_lights(world.relief, world.lights, 1.3), world.profile);
+    const auto found =
+        estimate_translucency_lights(world.diffuse, world.relief, Mask(), {}, {.softness = 0.5});
+    EXPECT_GT(luminance(found.lights.from_below), 0.2);
+    EXPECT_LT(nearest_deg(found.lights, world.lights.lights[0].direction), 10);
+}
+
+TEST(Bssrdf, SurfaceWithoutFresnelIsRecognised) {
+    const World world;
+    const ViewLights& lights = world.lights;
+    TranslucentRenderOptions options;
+    options.eta = 1;
+    const ImageRgb plain =
+        TranslucentRelief(world.relief, options)
+            .render(irradiance_from_lights(world.relief, lights, 1.0), world.profile);
+    BssrdfOptions fit;
+    fit.use_shadows = false;
+    fit.smoothing = 0.01;
+    EXPECT_FALSE(estimate_bssrdf(plain, world.relief, Mask(), lights, fit).is_fresnel);
+    EXPECT_TRUE(estimate_bssrdf(world.diffuse, world.relief, Mask(), lights, fit).is_fresnel);
+}
+
+TEST(ReliefRefinement, ShadingOfKnownLightsGivesTheBumps) {
+    const Relief smooth = ellipsoid(220, 100, 80);
+    Relief bumpy = smooth;
+    for (int y = 0; y < 220; ++y) {
+        for (int x = 0; x < 220; ++x) {
+            if (!is_inside(bumpy.mask, x, y)) continue;
+            const double bump = 8 * std::sin(0.07 * x) * std::cos(0.08 * y);
+            bumpy.depth_px(x, y) +=
+                static_cast<float>(bump * std::sqrt(smooth.depth_px(x, y) / 80));
+        }
+    }
+    bumpy.normals = relief_normals(bumpy.depth_px, bumpy.mask);
+    ViewLights lights = key_and_back(smooth, 1.0);
+    lights.lights.push_back({Vec3(0.6, -0.3, 0.74).normalized(), Rgbd::Constant(0.8)});
+    const ReliefIrradiance light = irradiance_from_lights(bumpy, lights, 1.0);
+    const auto error_deg = [&](const Relief& relief) {
+        double sum = 0, count = 0;
+        for (std::size_t i = 0; i < relief.mask.size(); ++i) {
+            if (relief.mask[i] <= 127) continue;
+            sum += degrees(
+                angle_between(relief.normals[i].cast<double>(), bumpy.normals[i].cast<double>()));
+            count += 1;
+        }
+        return sum / count;
+    };
+    const Relief found = refine_relief(smooth, light.front, Mask(), lights, 0, 1.0);
+    EXPECT_LT(error_deg(found), 0.65 * error_deg(smooth));
+    // A picture that the start explains already changes nothing.
+    const ReliefIrradiance plain = irradiance_from_lights(smooth, lights, 1.0);
+    const Relief same = refine_relief(smooth, plain.front, Mask(), lights, 0, 1.0);
+    for (std::size_t i = 0; i < same.mask.size(); ++i) {
+        if (same.mask[i] > 127) {
+            EXPECT_NEAR(same.depth_px[i], smooth.depth_px[i], 3);
+        }
+    }
 }
 
 TEST(Highlights, MatteObjectHasNone) {

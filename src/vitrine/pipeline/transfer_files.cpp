@@ -88,9 +88,9 @@ void write_lights_json(const std::filesystem::path& path, const PhotoAnalysis& a
     Json json;
     json["schema"] = "vitrine.view_lights/1";
     json["frame"] = "viewer: x right, y up, z toward the viewer";
-    const auto list = [](const std::vector<ViewLight>& lights) {
+    const auto list = [](const auto& lights) {
         Json items = Json::array();
-        for (const ViewLight& light : lights) {
+        for (const auto& light : lights) {
             items.push_back({{"direction", triple(light.direction.x(), light.direction.y(),
                                                   light.direction.z())},
                              {"irradiance",
@@ -102,6 +102,9 @@ void write_lights_json(const std::filesystem::path& path, const PhotoAnalysis& a
     json["lights"] = list(estimate.lights.lights);
     json["ambient_irradiance"] =
         triple(estimate.lights.ambient[0], estimate.lights.ambient[1], estimate.lights.ambient[2]);
+    json["from_below_irradiance"] =
+        triple(estimate.lights.from_below[0], estimate.lights.from_below[1],
+               estimate.lights.from_below[2]);
     json["highlight_lights"] = list(analysis.highlight_lights);
     json["relative_residual"] = estimate.relative_residual;
     json["outcome"] = outcome_name(estimate.outcome);

@@ -84,6 +84,7 @@ ImageRgb8 finished_codes(const TransferPicture& result, const PhotoAnalysis& tar
 TranslucentRenderOptions render_options(const TransferRequest& request) {
     TranslucentRenderOptions options;
     options.eta = request.analysis.bssrdf.eta;
+    options.use_curved_body = request.analysis.bssrdf.use_curved_body;
     return options;
 }
 
@@ -95,11 +96,16 @@ void set_paper_method(TransferRequest& request) {
     request.analysis.bssrdf.coupling = ChannelCoupling::Free;
     request.analysis.bssrdf.eta = 1.3;
     request.analysis.bssrdf.use_shadows = false;
+    request.analysis.bssrdf.use_curved_body = false;
+    request.analysis.bssrdf.transmittance = Transmittance::Fresnel;
+    request.analysis.lights.use_curved_body = false;
+    request.analysis.shape = ShapeModel::Inflated;
     request.analysis.relief.alpha = 0.6;
     request.irradiance = IrradianceSource::Lights;
     request.look.highlights = HighlightTransfer::Phong;
     request.look.phong_exponent = 5;
     request.look.highlight_weight = 0.5;
+    request.look.use_shadow_maps = true;
 }
 
 TransferSummary run_transfer(const TransferRequest& request, const Progress& progress) {

@@ -62,7 +62,7 @@ ImageRgb light_ball(const ViewLights& lights) {
             if (rest <= 0) continue;
             for (int side = 0; side < 2; ++side) {
                 const Vec3 n(u, v, side == 0 ? std::sqrt(rest) : -std::sqrt(rest));
-                Rgbd e = lights.ambient;
+                Rgbd e = lights.ambient + lights.from_below * facing_down(n.cast<float>());
                 for (const ViewLight& light : lights.lights)
                     e += light.intensity * std::max(0.0, n.dot(light.direction));
                 picture(x + side * size, y) = (e / kPi * 0.8).cast<float>();
@@ -118,6 +118,8 @@ std::string lights_table(const PhotoAnalysis& analysis) {
             degrees(std::acos(std::clamp(light.direction.z(), -1.0, 1.0))),
             100 * luminance(light.intensity) / total);
     }
+    html += fmt::format("<tr><td>from the ground</td><td></td><td></td><td>{:.0f} %</td></tr>",
+                        100 * 0.5 * luminance(lights.from_below) / total);
     html += fmt::format("<tr><td>from everywhere</td><td></td><td></td><td>{:.0f} %</td></tr>",
                         100 * luminance(lights.ambient) / total);
     return html + "</table>";
@@ -128,6 +130,23 @@ std::string figure(const fs::path& png, const std::string& caption) {
         "<figure style='display:inline-block;margin:0 1em 1em 0;vertical-align:top'>"
         "<img style='max-width:22em' src='{}' alt='{}'><figcaption>{}</figcaption></figure>",
         png_data_url(png), escape_html(caption), escape_html(caption));
+}
+
+/// What the model leaves unexplained of the material photo, four times enlarged around grey.
+ImageRgb residual_picture(const LiftedMaterial& source) {
+    const ImageRgb& diffuse = source.analysis.highlights.diffuse;
+    const Mask& mask = source.analysis.photo.mask;
+    ImageRgb picture(mask.width(), mask.height());
+    for (std::size_t i = 0; i < picture.size(); ++i) {
+        if (mask[i] <= 127) continue;
+        for (int c = 0; c < 3; ++c) {
+            const float seen =
+                linear_to_srgb(static_cast<float>(diffuse[i][c] / source.analysis.white));
+            const float left = seen - linear_to_srgb(source.rendered[i][c]);
+            picture[i][c] = srgb_to_linear(std::clamp(0.5f + 4 * left, 0.0f, 1.0f));
+        }
+    }
+    return picture;
 }
 
 std::string analysis_html(const ScratchFolder& scratch, const std::string& id,
@@ -146,8 +165,11 @@ std::string analysis_html(const ScratchFolder& scratch, const std::string& id,
     html += figure(scratch.save(id + "_ball", light_ball(analysis.lights.lights)),
                    "the lights on a white ball, front and back");
     html += fmt::format(
-        "<p>Inradius {:.0f} px. Highlights: {:.1f} % of the object ({}). Lighting explained to "
+        "<p>{}Inradius {:.0f} px. Highlights: {:.1f} % of the object ({}). Lighting explained to "
         "{:.0f} %.</p>",
+        analysis.relief.is_cluster()
+            ? fmt::format("A cluster of {} balls. ", analysis.relief.balls.size())
+            : "",
         analysis.relief.inradius_px, 100 * highlights.share, method,
         100 * (1 - std::min(1.0, analysis.lights.relative_residual)));
     return html + lights_table(analysis);
@@ -186,11 +208,15 @@ void write_transfer_report(const fs::path& path, const LiftedMaterial* source,
     body += "</table>" + profile_plot(medium);
     if (source != nullptr) {
         body += fmt::format(
-            "<p>The material photo is reproduced at {:.1f} dB; the best single colour reaches "
+            "<p>The surface is taken to let light in {}. The material photo is reproduced at "
+            "{:.1f} dB; the best single colour reaches "
             "{:.1f} dB.</p>",
-            source->self_psnr_db, source->flat_psnr_db);
+            medium.is_fresnel ? "by Fresnel's law" : "as it falls", source->self_psnr_db,
+            source->flat_psnr_db);
         body += figure(scratch.save("self", shrunk(source->rendered)),
                        "the material photo's object, rendered");
+        body += figure(scratch.save("residual", shrunk(residual_picture(*source))),
+                       "what that leaves unexplained, four times enlarged");
         body += "<h2>Material photo</h2>" + analysis_html(scratch, "source", source->analysis);
     }
     body += "<h2>Object photo</h2>" + analysis_html(scratch, "target", target);

@@ -40,6 +40,7 @@ ViewLights mean_lights(const std::deque<PhotoAnalysis>& window) {
             pooled.lights.push_back(light);
         }
         pooled.ambient += frame.lights.lights.ambient * share;
+        pooled.from_below += frame.lights.lights.from_below * share;
     }
     return pooled;
 }
@@ -78,6 +79,7 @@ TransferSummary run_transfer_sequence(const TransferRequest& request, const Prog
 
     TranslucentRenderOptions render_options;
     render_options.eta = request.analysis.bssrdf.eta;
+    render_options.use_curved_body = request.analysis.bssrdf.use_curved_body;
     // The scale is that of the first frame: an object that comes closer keeps its material.
     double ratio = 0;
     std::deque<PhotoAnalysis> window;

@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "image/filter.h"
 #include "image/poisson.h"
+#include "optics/curved_body.h"
 #include "render/kernel_table.h"
 #include "render/split_kernel.h"
 
@@ -11,6 +12,7 @@ namespace {
 
 struct Sources {
     std::vector<float> x, y, z;
+    std::vector<float> normal_x, normal_y, normal_z;
     std::vector<Eigen::Array4f> power;  ///< sum of E dA per cell
 };
 
@@ -22,11 +24,28 @@ Eigen::Array4f widen(const Rgb& v) { return {v[0], v[1], v[2], 0.0f}; }
 /// Squared distances (in pixels) below this look up the top of the cap.
 constexpr float kSmallestSquare = 0.01f;
 
-/// sum_i R(|p - y_i|) power_i
-Eigen::Array4f gather_at(const Vec3f& p, const Sources& sources, const KernelTable& table,
-                         float q_max) {
+/// C(s) of optics/curved_body for three channels; all zero: as if flat.
+struct BodyFactors {
+    Eigen::Array4f linear = Eigen::Array4f::Zero(), quadratic = Eigen::Array4f::Zero();
+};
+
+BodyFactors body_factors(const RadialProfile& profile, const TranslucentRenderOptions& options) {
+    BodyFactors factors;
+    if (!options.use_curved_body) return factors;
+    const Rgbd albedo = profile.total();
+    for (int c = 0; c < 3; ++c) {
+        const CurvedBodyFactor factor = curved_body_factor(albedo[c]);
+        factors.linear[c] = static_cast<float>(factor.linear);
+        factors.quadratic[c] = static_cast<float>(factor.quadratic);
+    }
+    return factors;
+}
+
+/// sum_i R(|p - y_i|) C(rise) power_i
+Eigen::Array4f gather_at(const Vec3f& p, const Vec3f& normal, const Sources& sources,
+                         const KernelTable& table, const BodyFactors& body, float q_max) {
     constexpr std::size_t kChunk = 256;
-    float q[kChunk];
+    float q[kChunk], rise[kChunk];
     Eigen::Array4f total = Eigen::Array4f::Zero();
     for (std::size_t begin = 0; begin < sources.x.size(); begin += kChunk) {
         const std::size_t count = std::min(kChunk, sources.x.size() - begin);
@@ -35,8 +54,15 @@ Eigen::Array4f gather_at(const Vec3f& p, const Sources& sources, const KernelTab
             const float dy = sources.y[begin + k] - p.y();
             const float dz = sources.z[begin + k] - p.z();
             q[k] = std::min(dx * dx + dy * dy + dz * dz + kSmallestSquare, q_max);
+            const float along = dx * (sources.normal_x[begin + k] - normal.x()) +
+                                dy * (sources.normal_y[begin + k] - normal.y()) +
+                                dz * (sources.normal_z[begin + k] - normal.z());
+            rise[k] = std::min(std::max(0.0f, 0.5f * along / std::sqrt(q[k])), 1.0f);
         }
-        for (std::size_t k = 0; k < count; ++k) total += table(q[k]) * sources.power[begin + k];
+        for (std::size_t k = 0; k < count; ++k) {
+            total += table(q[k]) * sources.power[begin + k] *
+                     (1 + rise[k] * (body.linear + rise[k] * body.quadratic));
+        }
     }
     return total;
 }
@@ -102,6 +128,11 @@ Sources sources_from(const ReliefSamples& samples, const Relief& relief,
         sources.y.push_back(p.y());
         sources.z.push_back(p.z());
     }
+    for (const Vec3f& n : samples.normal) {
+        sources.normal_x.push_back(n.x());
+        sources.normal_y.push_back(n.y());
+        sources.normal_z.push_back(n.z());
+    }
     sources.power.assign(samples.position.size(), Eigen::Array4f::Zero());
     const double step = samples.step_px;
     for (int y = 0; y < relief.mask.height(); ++y) {
@@ -126,13 +157,16 @@ TranslucentRelief::TranslucentRelief(Relief relief, const TranslucentRenderOptio
       samples_(sample_relief(relief_, options.cells_per_side)) {}
 
 std::vector<Rgb> TranslucentRelief::gather(const ReliefIrradiance& irradiance,
-                                           const RadialProfile& far) const {
+                                           const RadialProfile& far,
+                                           const RadialProfile& whole) const {
     const Sources sources = sources_from(samples_, relief_, irradiance);
     const float q_max = largest_squared_distance(samples_);
     const KernelTable table(far, kSmallestSquare, q_max);
+    const BodyFactors body = body_factors(whole, options_);
     std::vector<Rgb> result(samples_.front_count);
     parallel_for(samples_.front_count, 32, [&](std::size_t k) {
-        result[k] = gather_at(samples_.position[k], sources, table, q_max).head<3>();
+        result[k] = gather_at(samples_.position[k], samples_.normal[k], sources, table, body, q_max)
+                        .head<3>();
     });
     return result;
 }
@@ -141,7 +175,7 @@ ImageRgb TranslucentRelief::render(const ReliefIrradiance& irradiance,
                                    const RadialProfile& profile) const {
     const double step = samples_.step_px;
     const SplitKernel split = split_kernel(profile, kCapCells * step);
-    const std::vector<Rgb> exitance = gather(irradiance, split.far);
+    const std::vector<Rgb> exitance = gather(irradiance, split.far, profile);
     ImageRgb lattice(samples_.cell.width(), samples_.cell.height());
     Mask known(lattice.width(), lattice.height());
     for (std::size_t k = 0; k < lattice.size(); ++k) {
@@ -177,13 +211,16 @@ ImageRgb render_translucent_brute_force(const Relief& relief, const ReliefIrradi
     const float q_max = largest_squared_distance(samples);
     const KernelTable table(split.far, kSmallestSquare, q_max);
     const Rgb near_share = split.near_share.cast<float>();
+    const BodyFactors body = body_factors(profile, options);
     ImageRgb result(relief.mask.width(), relief.mask.height());
     parallel_for(
         static_cast<std::size_t>((result.height() + stride - 1) / stride), 1, [&](std::size_t row) {
             const int y = static_cast<int>(row) * stride;
             for (int x = 0; x < result.width(); x += stride) {
                 if (!is_inside(relief.mask, x, y)) continue;
-                const Rgb far = gather_at(relief.point(x, y), sources, table, q_max).head<3>();
+                const Rgb far =
+                    gather_at(relief.point(x, y), relief.normals(x, y), sources, table, body, q_max)
+                        .head<3>();
                 result(x, y) = (far + near_share * irradiance.front(x, y)) *
                                (transmittance_out(relief.normals(x, y), options) / kPif);
             }

@@ -11,13 +11,16 @@ struct TranslucentRenderOptions {
     double eta = 1.3;           ///< for the light that leaves
     double min_cos_out = 0.6;   ///< cosines to the viewer are raised to this in the transmittance
                                 ///< out: true rims get back by grazing reflection what they lose
+    bool use_curved_body =
+        true;  ///< C(s) of optics/curved_body.h; false: the flat R_d, as published
 };
 
 /// Renders one relief under changing light and material (Jensen et al. 2001, Eq. 5):
-///   C(x) = F_t(n . v) / pi * sum over front and back of R_d(|x - y|) E(y) dA
+///   C(x) = F_t(n . v) / pi * sum over front and back of R_d(|x - y|) C(s) E(y) dA
+/// with C(s) the gain of a closed body over a flat one (optics/curved_body.h),
 /// on a coarse lattice, then brought to full resolution with the near field, which a lattice
-/// cannot hold, put back from the full-resolution irradiance. This takes the place of
-/// translucent shadow maps (Dachsbacher and Stamminger 2003): same idea, both sides, bounded error.
+/// cannot hold, put back from the full-resolution irradiance. The role of translucent shadow maps
+/// (render/translucent_shadow_map.h): same idea, both sides, bounded error.
 ///
 /// Construction costs O(pixels); each render O(cells^2) + O(pixels): about 0.1 s per megapixel.
 /// Same bits for any thread count.
@@ -33,7 +36,8 @@ class TranslucentRelief {
     const ReliefSamples& samples() const { return samples_; }
 
   private:
-    std::vector<Rgb> gather(const ReliefIrradiance& irradiance, const RadialProfile& far) const;
+    std::vector<Rgb> gather(const ReliefIrradiance& irradiance, const RadialProfile& far,
+                            const RadialProfile& whole) const;
 
     Relief relief_;
     TranslucentRenderOptions options_;

@@ -9,8 +9,37 @@ double entering_irradiance(const Vec3f& normal, const Vec3& direction, double et
     return cosine <= 0 ? 0 : cosine * fresnel_transmittance(cosine, eta);
 }
 
+namespace {
+
+ReliefSamples sample_balls(const Relief& relief, int count) {
+    double area = 0;
+    for (const Ball& ball : relief.balls) area += 4 * kPi * ball.radius_px * ball.radius_px;
+    ReliefSamples samples;
+    samples.step_px = std::sqrt(area / count);
+    const double golden = kPi * (3 - std::sqrt(5.0));
+    for (std::size_t k = 0; k < relief.balls.size(); ++k) {
+        const Ball& ball = relief.balls[k];
+        const double ball_area = 4 * kPi * ball.radius_px * ball.radius_px;
+        const int share = std::max(30, static_cast<int>(count * ball_area / area));
+        for (int i = 0; i < share; ++i) {
+            const double z = 1 - 2 * (i + 0.5) / share, rho = std::sqrt(1 - z * z);
+            const Vec3f n =
+                Vec3(rho * std::cos(golden * i), rho * std::sin(golden * i), z).cast<float>();
+            samples.normal.push_back(n);
+            samples.position.push_back(ball.centre_px + ball.radius_px * n);
+            samples.area_px2.push_back(static_cast<float>(ball_area / share));
+            samples.ball.push_back(static_cast<std::int16_t>(k));
+        }
+    }
+    samples.front_count = samples.position.size();
+    return samples;
+}
+
+}  // namespace
+
 ReliefSamples sample_relief(const Relief& relief, int per_side) {
     VITRINE_CHECK_GT(per_side, 0);
+    if (relief.is_cluster()) return sample_balls(relief, 2 * per_side);
     const Mask& mask = relief.mask;
     std::size_t inside = 0;
     int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
@@ -37,6 +66,7 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
 
     struct Sum {
         Vec3 position = Vec3::Zero(), normal = Vec3::Zero();
+        double back = 0;
         double area = 0, count = 0;
     };
     std::vector<Sum> sums(samples.cell.size());
@@ -49,13 +79,16 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
             const Vec3f& n = relief.normals(x, y);
             const double area = 1 / std::max(n.z(), kMinAreaCos);
             sum.position += relief.point(x, y).cast<double>();
+            sum.back += relief.back_px(x, y);
             sum.normal += n.cast<double>() * area;
             sum.area += area;
             sum.count += 1;
         }
     }
+    std::vector<float> back;
     for (std::size_t k = 0; k < sums.size(); ++k) {
         if (sums[k].count == 0) continue;
+        back.push_back(static_cast<float>(sums[k].back / sums[k].count));
         samples.cell[k] = static_cast<std::int32_t>(samples.position.size());
         samples.position.push_back((sums[k].position / sums[k].count).cast<float>());
         samples.normal.push_back(sums[k].normal.normalized().cast<float>());
@@ -64,7 +97,7 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
     samples.front_count = samples.position.size();
     for (std::size_t k = 0; k < samples.front_count; ++k) {
         const Vec3f p = samples.position[k], n = samples.normal[k];
-        samples.position.push_back({p.x(), p.y(), -p.z()});
+        samples.position.push_back({p.x(), p.y(), back[k]});
         samples.normal.push_back({n.x(), n.y(), -n.z()});
         samples.area_px2.push_back(samples.area_px2[k]);
     }
@@ -80,7 +113,8 @@ ReliefIrradiance irradiance_from_lights(const Relief& relief, const ViewLights& 
         for (int x = 0; x < relief.mask.width(); ++x) {
             if (!is_inside(relief.mask, x, y)) continue;
             const Vec3f n = relief.normals(x, y);
-            Rgbd front = lights.ambient, back = lights.ambient;
+            Rgbd front = lights.ambient + lights.from_below * facing_down(n);
+            Rgbd back = front;
             for (const ViewLight& light : lights.lights) {
                 front += light.intensity * entering_irradiance(n, light.direction, eta);
                 back += light.intensity *
@@ -102,6 +136,7 @@ double normalise_lights(ViewLights& lights, const Relief& relief, double eta) {
     const double factor = kPi / brightest;
     for (ViewLight& light : lights.lights) light.intensity *= factor;
     lights.ambient *= factor;
+    lights.from_below *= factor;
     return factor;
 }
 

@@ -11,9 +11,10 @@ namespace vitrine {
 
 /// Cells of a square lattice over the mask, front and mirrored back. Viewer frame, pixels.
 struct ReliefSamples {
-    std::vector<Vec3f> position;  ///< front samples first, then back ones in the same order
-    std::vector<Vec3f> normal;    ///< unit
-    std::vector<float> area_px2;  ///< of the curved surface in the cell
+    std::vector<Vec3f> position;     ///< front samples first, then back ones in the same order
+    std::vector<Vec3f> normal;       ///< unit
+    std::vector<float> area_px2;     ///< of the curved surface in the cell
+    std::vector<std::int16_t> ball;  ///< of a cluster: which ball; empty for one body
     std::size_t front_count = 0;
     double step_px = 1;        ///< side of a cell
     Image<std::int32_t> cell;  ///< lattice of front sample numbers, -1 where there is no object
@@ -23,12 +24,16 @@ struct ReliefSamples {
 /// Surface per projected area is capped at 1 / kMinAreaCos: rim pixels are only partly object.
 constexpr float kMinAreaCos = 0.15f;
 
-/// About `per_side` samples on each side. The back mirrors the front about the silhouette plane
+/// About `per_side` samples on each side; on the balls of a cluster twice that many in all, spread
+/// evenly (no lattice then). The back mirrors the front about the silhouette plane
 /// (the assumption of the paper): position (x, y, -z), normal (nx, ny, -nz).
 ReliefSamples sample_relief(const Relief& relief, int per_side);
 
 /// What a distant light of unit irradiance sends through a surface of normal n.
 double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta);
+
+/// Share of an even half-space of light about (0, -1, 0) that a surface of normal n faces.
+inline float facing_down(const Vec3f& normal) { return 0.5f * (1 - normal.y()); }
 
 /// Irradiance that enters the object per surface area, on the visible side and on the mirrored
 /// back. Linear in the lights.

@@ -1,5 +1,6 @@
 #include "base/parallel.h"
-#include "render/translucent_relief.h"
+#include "render/render_object.h"
+#include "render/translucent_shadow_map.h"
 
 #include <gtest/gtest.h>
 
@@ -97,6 +98,70 @@ TEST(Translucent, NormalisedLightsReachPi) {
     float brightest = 0;
     for (const Rgb& e : irradiance.front) brightest = std::max(brightest, luminance(e));
     EXPECT_NEAR(brightest, kPi, 1e-4);
+}
+
+TEST(Translucent, ShadowMapsComeNearTheSumOfTheFrontSide) {
+    const Relief relief = ball(128, 58);
+    ViewLights lights;
+    lights.lights.push_back({Vec3(-0.3, 0.4, 0.87).normalized(), Rgbd::Ones()});
+    ReliefIrradiance irradiance = irradiance_from_lights(relief, lights, 1.3);
+    for (Rgb& back : irradiance.back) back.setZero();
+    const TwoExponentials fit{1.5e-3, -1 / 7.0, 0, -1};
+    const RadialProfile profile = tabulate({fit, fit, fit}, 0.01, 200);
+    TranslucentRenderOptions options;
+    options.use_curved_body = false;
+    const ImageRgb sum = TranslucentRelief(relief, options).render(irradiance, profile);
+    const ImageRgb maps = render_translucent_shadow_maps(relief, lights, profile, options);
+    EXPECT_LT(mean_error(maps, sum, relief.mask), 0.3);
+    // What the published maps lose: a light from behind reaches only the rim.
+    lights.lights[0].direction = Vec3(0, 0, -1);
+    const ImageRgb lost = render_translucent_shadow_maps(relief, lights, profile, options);
+    EXPECT_EQ(lost(64, 64)[0], 0);
+}
+
+TEST(Translucent, ObjectShadowsItself) {
+    // Two balls in the line of the light: the second lies in the shadow of the first.
+    Relief cluster;
+    cluster.mask = Mask(200, 100);
+    cluster.depth_px = ImageF(200, 100);
+    cluster.normals = Image<Vec3f>(200, 100, Vec3f(0, 0, 1));
+    cluster.ball_of = Image<std::int16_t>(200, 100, -1);
+    cluster.inradius_px = 30;
+    cluster.balls = {{Vec3f(50, -50, 0), 30}, {Vec3f(130, -50, 0), 30}};
+    const std::vector<Vec3f> position = {{20, -50, 0}, {100, -50, 0}, {160, -50, 0}};
+    const std::vector<Vec3f> normal = {{-1, 0, 0}, {-1, 0, 0}, {1, 0, 0}};
+    const std::vector<std::int16_t> ball_index = {0, 1, 1};
+    const SurfacePoints points{position, normal, ball_index};
+    EXPECT_EQ(visibility(cluster, points, Vec3(-1, 0, 0)), (std::vector<float>{1, 0, 0}));
+    EXPECT_EQ(visibility(cluster, points, Vec3(1, 0, 0)), (std::vector<float>{0, 0, 1}));
+    const SkyShares sky = sky_shares(cluster, points);
+    EXPECT_FLOAT_EQ(sky.ambient[0], 1);
+    EXPECT_LT(sky.ambient[1], 0.95f);
+    EXPECT_NEAR(sky.below[0], 0.5, 0.05);
+}
+
+TEST(Translucent, EvenLightOnOneBodyNeedsNoShadows) {
+    const Relief relief = ball(100, 40);
+    ViewLights lights;
+    lights.ambient = Rgbd::Constant(0.5);
+    lights.from_below = Rgbd::Constant(0.4);
+    const ReliefIrradiance plain = irradiance_from_lights(relief, lights, 1.3);
+    const ReliefIrradiance shadowed = irradiance_with_shadows(relief, lights, 1.3);
+    EXPECT_NEAR(plain.front(50, 30)[0], shadowed.front(50, 30)[0], 0.03);
+    EXPECT_NEAR(plain.back(50, 70)[1], shadowed.back(50, 70)[1], 0.03);
+}
+
+TEST(Translucent, ClosedBodyPassesMoreThanTheFlatProfile) {
+    const Relief relief = ball(128, 58);
+    const ReliefIrradiance irradiance = irradiance_from_lights(relief, key_and_back(), 1.3);
+    const TwoExponentials fit{4e-4, -1 / 15.0, 0, -1};
+    const RadialProfile profile = tabulate({fit, fit, fit}, 0.01, 300);
+    TranslucentRenderOptions flat;
+    flat.use_curved_body = false;
+    const float curved = TranslucentRelief(relief).render(irradiance, profile)(64, 64)[0];
+    const float plain = TranslucentRelief(relief, flat).render(irradiance, profile)(64, 64)[0];
+    EXPECT_GT(curved, 1.1f * plain);
+    EXPECT_LT(curved, 2.0f * plain);
 }
 
 TEST(Translucent, SameBitsOnAnyThreadCount) {

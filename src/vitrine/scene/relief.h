@@ -6,18 +6,36 @@
 
 #include "image/image.h"
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 namespace vitrine {
 
+/// One round body of a cluster: a berry, a tomato, an egg in a box.
+struct Ball {
+    Vec3f centre_px = Vec3f::Zero();  ///< viewer frame: (column, -row, height)
+    float radius_px = 0;
+};
+
 struct Relief {
     Mask mask;                  ///< 255 where there is an object
     ImageF depth_px;            ///< height above the silhouette plane z = 0; 0 outside
+    ImageF middle_px;           ///< height about which the back mirrors the front; empty: 0
     Image<Vec3f> normals;       ///< unit, viewer frame; (0, 0, 1) outside
     Image<Vec3f> base_normals;  ///< of the smooth base without shading detail; empty: use `normals`
     double inradius_px = 0;     ///< of the mask: the unit of every length parameter
 
+    /// A cluster: light travels inside each ball, not from one to the next. Empty: one body, its
+    /// back the mirror of its front.
+    std::vector<Ball> balls;
+    Image<std::int16_t> ball_of;  ///< which ball a pixel shows; -1: none. Empty without balls
+
+    /// Height of the unseen back.
+    float back_px(int x, int y) const {
+        return middle_px.empty() ? -depth_px(x, y) : 2 * middle_px(x, y) - depth_px(x, y);
+    }
+    bool is_cluster() const { return !balls.empty(); }
     Vec3f point(int x, int y) const {
         return {static_cast<float>(x), static_cast<float>(-y), depth_px(x, y)};
     }
@@ -36,9 +54,12 @@ struct ViewLight {
 struct ViewLights {
     std::vector<ViewLight> lights;
     Rgbd ambient = Rgbd::Zero();  ///< irradiance
+    /// Irradiance, on a surface that faces down, of the light that the ground throws back: an even
+    /// half-space of light about (0, -1, 0).
+    Rgbd from_below = Rgbd::Zero();
 
     double total() const {
-        double sum = luminance(ambient);
+        double sum = luminance(ambient) + 0.5 * luminance(from_below);
         for (const ViewLight& light : lights) sum += luminance(light.intensity);
         return sum;
     }

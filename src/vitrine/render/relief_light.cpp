@@ -1,0 +1,123 @@
+#include "render/relief_light.h"
+
+#include "base/parallel.h"
+
+namespace vitrine {
+namespace {
+
+bool is_hidden_by_balls(const Relief& relief, std::size_t own, const Vec3f& point,
+                        const Vec3f& direction) {
+    for (std::size_t k = 0; k < relief.balls.size(); ++k) {
+        if (k == own) continue;
+        const Ball& ball = relief.balls[k];
+        const Vec3f to_centre = ball.centre_px - point;
+        const float along = to_centre.dot(direction);
+        if (along <= 0) continue;
+        if ((to_centre - along * direction).squaredNorm() < ball.radius_px * ball.radius_px)
+            return true;
+    }
+    return false;
+}
+
+bool is_hidden_by_relief(const Relief& relief, float top, const Vec3f& point, const Vec3f& normal,
+                         const Vec3f& direction) {
+    const auto radius = static_cast<float>(relief.inradius_px);
+    const float step = std::max(1.0f, 0.05f * radius);
+    const float flat = std::hypot(direction.x(), direction.y());
+    // Clear of the surface first: samples and depth differ by a cell.
+    const Vec3f start = point + 0.06f * radius * normal;
+    for (int k = 1; k < 200; ++k) {
+        const Vec3f p = start + (static_cast<float>(k) * step / std::max(flat, 0.2f)) * direction;
+        if (std::abs(p.z()) > top) return false;
+        const int x = static_cast<int>(std::lround(p.x()));
+        const int y = static_cast<int>(std::lround(-p.y()));
+        if (!relief.mask.contains(x, y)) return false;
+        if (is_inside(relief.mask, x, y) && p.z() < relief.depth_px(x, y) &&
+            p.z() > relief.back_px(x, y)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
+std::vector<Vec3> fibonacci_directions(int count, double z_min) {
+    std::vector<Vec3> directions;
+    const double golden = kPi * (3 - std::sqrt(5.0));
+    for (int i = 0; i < count; ++i) {
+        const double z = 1 - (1 - z_min) * (i + 0.5) / count;
+        const double rho = std::sqrt(std::max(0.0, 1 - z * z));
+        directions.emplace_back(rho * std::cos(golden * i), rho * std::sin(golden * i), z);
+    }
+    return directions;
+}
+
+std::vector<float> visibility(const Relief& relief, const SurfacePoints& points,
+                              const Vec3& direction) {
+    const Vec3f w = direction.cast<float>();
+    std::vector<float> seen(points.position.size(), 1.0f);
+    float top = 0;  // beyond this height there is nothing
+    for (const float z : relief.depth_px) top = std::max(top, std::abs(z));
+    if (!relief.middle_px.empty()) top *= 3;
+    parallel_for(points.position.size(), 256, [&](std::size_t i) {
+        const bool is_hidden =
+            points.normal[i].dot(w) <= 0 ||
+            (relief.is_cluster()
+                 ? is_hidden_by_balls(relief, static_cast<std::size_t>(points.ball[i]),
+                                      points.position[i], w)
+                 : is_hidden_by_relief(relief, top, points.position[i], points.normal[i], w));
+        if (is_hidden) seen[i] = 0;
+    });
+    return seen;
+}
+
+SkyShares sky_shares(const Relief& relief, const SurfacePoints& points, int direction_count) {
+    const std::size_t count = points.position.size();
+    std::vector<float> cosines(count, 0.0f);
+    SkyShares shares{std::vector<float>(count, 0.0f), std::vector<float>(count, 0.0f)};
+    for (const Vec3& direction : fibonacci_directions(direction_count, -1.0)) {
+        const std::vector<float> seen = visibility(relief, points, direction);
+        const Vec3f w = direction.cast<float>();
+        for (std::size_t i = 0; i < count; ++i) {
+            const float cosine = std::max(0.0f, points.normal[i].dot(w));
+            cosines[i] += cosine;
+            shares.ambient[i] += cosine * seen[i];
+            if (w.y() < 0) shares.below[i] += cosine * seen[i];
+        }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        const float norm = std::max(cosines[i], 1e-6f);
+        shares.ambient[i] /= norm;
+        shares.below[i] /= norm;
+    }
+    return shares;
+}
+
+std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,
+                                const ViewLights& lights, double eta, bool use_shadows) {
+    const std::size_t count = points.position.size();
+    std::vector<Rgb> result(count);
+    SkyShares sky;
+    if (use_shadows) {
+        sky = sky_shares(relief, points);
+    } else {
+        sky.ambient.assign(count, 1.0f);
+        for (const Vec3f& normal : points.normal) sky.below.push_back(facing_down(normal));
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        result[i] = lights.ambient.cast<float>() * sky.ambient[i] +
+                    lights.from_below.cast<float>() * sky.below[i];
+    }
+    for (const ViewLight& light : lights.lights) {
+        std::vector<float> seen(count, 1.0f);
+        if (use_shadows) seen = visibility(relief, points, light.direction);
+        for (std::size_t i = 0; i < count; ++i) {
+            const double e = entering_irradiance(points.normal[i], light.direction, eta) * seen[i];
+            result[i] += (light.intensity * e).cast<float>();
+        }
+    }
+    return result;
+}
+
+}  // namespace vitrine
