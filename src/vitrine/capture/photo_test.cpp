@@ -1,5 +1,6 @@
 #include "capture/photo.h"
 
+#include "base/scratch_folder.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
@@ -8,20 +9,13 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <unistd.h>
 
 namespace vitrine {
 namespace {
 
-namespace fs = std::filesystem;
-
 class PhotoTest : public ::testing::Test {
   protected:
-    void SetUp() override {
-        folder_ = fs::temp_directory_path() / fmt::format("vitrine_photo_{}", ::getpid());
-        fs::create_directories(folder_);
-    }
-    void TearDown() override { fs::remove_all(folder_); }
+    ScratchFolder folder_{"photo"};
 
     /// A red disc with a soft shade on blue.
     static ImageRgb disc_picture(int size, double radius) {
@@ -54,7 +48,6 @@ class PhotoTest : public ::testing::Test {
         }
         return "";
     }
-    fs::path folder_;
 };
 
 TEST_F(PhotoTest, ReadsPhotoAndMask) {
