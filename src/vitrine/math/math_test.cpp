@@ -119,6 +119,8 @@ TEST(Sampling, LowDiscrepancyPointsFillTheSquare) {
     for (std::uint32_t i = 0; i < 256; ++i) {
         const auto cell = [](float x, float y) { return int(x * 16) * 16 + int(y * 16); };
         ++sobol[cell(scrambled_sobol(i, 0, 9), scrambled_sobol(i, 1, 9))];
+        EXPECT_EQ(scrambled_sobol_pair(i, 9),
+                  Vec2f(scrambled_sobol(i, 0, 9), scrambled_sobol(i, 1, 9)));
         const Vec2f p = r2_point(i);
         ++r2[cell(p.x(), p.y())];
         ++halton_cells[cell(halton(i, 0), halton(i, 1))];

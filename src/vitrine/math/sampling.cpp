@@ -19,15 +19,19 @@ std::uint32_t reverse_bits(std::uint32_t v) {
     return ((v & 0x55555555u) << 1) | ((v & 0xaaaaaaaau) >> 1);
 }
 
-/// Laine-Karras style permutation of bit-reversed bits; constants of Burley 2020, listing 2.
-std::uint32_t owen_scramble(std::uint32_t v, std::uint32_t seed) {
-    v = reverse_bits(v);
+/// Laine-Karras style permutation of bits that are reversed already; constants of Burley 2020,
+/// listing 2.
+std::uint32_t scramble_reversed(std::uint32_t v, std::uint32_t seed) {
     v += seed;
     v ^= v * 0x6c50b47cu;
     v ^= v * 0xb82f1e52u;
     v ^= v * 0xc7afe638u;
     v ^= v * 0x8d22f6e6u;
-    return reverse_bits(v);
+    return v;
+}
+
+std::uint32_t owen_scramble(std::uint32_t v, std::uint32_t seed) {
+    return reverse_bits(scramble_reversed(reverse_bits(v), seed));
 }
 
 std::uint32_t hash_combine(std::uint32_t seed, std::uint32_t v) {
@@ -147,6 +151,17 @@ float scrambled_sobol(std::uint32_t index, int dimension, std::uint32_t seed) {
                          table[2][(i >> 16) & 255u] ^ table[3][i >> 24];
     bits = owen_scramble(bits, hash_combine(seed, static_cast<std::uint32_t>(dimension)));
     return static_cast<float>(bits >> 8) * 0x1p-24f;
+}
+
+Vec2f scrambled_sobol_pair(std::uint32_t index, std::uint32_t seed) {
+    const std::uint32_t i = owen_scramble(index, seed);
+    // The first dimension is the index with its bits reversed, so reversed again it is the index.
+    const std::uint32_t x = reverse_bits(scramble_reversed(i, hash_combine(seed, 0)));
+    const auto& table = kSobol.table[1];
+    const std::uint32_t bits = table[0][i & 255u] ^ table[1][(i >> 8) & 255u] ^
+                               table[2][(i >> 16) & 255u] ^ table[3][i >> 24];
+    const std::uint32_t y = owen_scramble(bits, hash_combine(seed, 1));
+    return {static_cast<float>(x >> 8) * 0x1p-24f, static_cast<float>(y >> 8) * 0x1p-24f};
 }
 
 std::vector<Vec3> fibonacci_sphere(int count) {

@@ -36,6 +36,9 @@ float halton(std::uint64_t index, int dimension);
 /// Owen-scrambled Sobol point of one of the first four dimensions (Burley 2020, hash-based).
 float scrambled_sobol(std::uint32_t index, int dimension, std::uint32_t seed);
 
+/// Dimensions 0 and 1 of `scrambled_sobol`, at a third less than both cost apart.
+Vec2f scrambled_sobol_pair(std::uint32_t index, std::uint32_t seed);
+
 /// `count` nearly even directions on the sphere (Fibonacci spiral).
 std::vector<Vec3> fibonacci_sphere(int count);
 

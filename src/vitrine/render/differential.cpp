@@ -103,6 +103,18 @@ Image<int> plan_change(const Image<PixelSums>& sums, double target, int max_samp
 
 }  // namespace
 
+DifferentialOptions preview_options() {
+    DifferentialOptions options;
+    options.min_samples = 1;
+    options.max_samples = 4;
+    options.noise_target = 0.03;
+    options.photon_count = 150'000;
+    options.photon_passes = 1;
+    options.paths.max_diffuse_bounces = 1;
+    options.paths.split_depth = 2;
+    return options;
+}
+
 ImageRgb DifferentialImage::delta() const {
     ImageRgb sum(with.width(), with.height());
     for (std::size_t i = 0; i < sum.size(); ++i) {
@@ -116,7 +128,21 @@ DifferentialRenderer::DifferentialRenderer(Scene real, std::vector<Part> virtual
                                            const DifferentialOptions& options,
                                            const Progress& progress)
     : scene_(combine(std::move(real), std::move(virtual_parts))), options_(options) {
-    double radius = options.gather_radius_m;
+    trace_photons(cameras, progress);
+}
+
+DifferentialRenderer::DifferentialRenderer(const RenderScene& world,
+                                           std::vector<Part> virtual_parts,
+                                           std::span<const Camera> cameras,
+                                           const DifferentialOptions& options,
+                                           const Progress& progress)
+    : scene_(world, std::move(virtual_parts)), options_(options) {
+    trace_photons(cameras, progress);
+}
+
+void DifferentialRenderer::trace_photons(std::span<const Camera> cameras,
+                                         const Progress& progress) {
+    double radius = options_.gather_radius_m;
     if (radius <= 0) {
         for (const Camera& camera : cameras) {
             const double r = pixel_radius(scene_, camera);
@@ -126,9 +152,9 @@ DifferentialRenderer::DifferentialRenderer(Scene real, std::vector<Part> virtual
     VITRINE_CHECK_GT(radius, 0.0);
     CausticOptions caustics;
     caustics.gather_radius_m = radius;
-    caustics.seed = options.seed;
-    const int passes = std::max(1, options.photon_passes);
-    caustics.photon_count = options.photon_count / static_cast<std::uint64_t>(passes);
+    caustics.seed = options_.seed;
+    const int passes = std::max(1, options_.photon_passes);
+    caustics.photon_count = options_.photon_count / static_cast<std::uint64_t>(passes);
     for (int pass = 0; pass < passes; ++pass) {
         caustics.pass = pass;
         const CausticPhotons photons = trace_caustics(
@@ -137,9 +163,9 @@ DifferentialRenderer::DifferentialRenderer(Scene real, std::vector<Part> virtual
         maps_.push_back(build_caustic_maps(photons.photons, progressive_radius(radius, pass)));
     }
     TranslucentLightOptions translucent;
-    translucent.seed = options.seed;
+    translucent.seed = options_.seed;
     const CausticMaps* first = maps_.front().empty() ? nullptr : &maps_.front();
-    translucent_ = light_translucent_bodies(scene_, first, options.paths, translucent);
+    translucent_ = light_translucent_bodies(scene_, first, options_.paths, translucent);
 }
 
 DifferentialImage DifferentialRenderer::render(const Camera& camera,

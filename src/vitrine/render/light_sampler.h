@@ -51,6 +51,11 @@ class LightSampler {
     /// The discs that a ray meets before `max_distance`, on their bright side, one call per light.
     std::optional<Hit> hit(std::size_t light, const Vec3f& origin, const Vec3f& direction,
                            float max_distance) const;
+    /// Whether `sample` and `emit` use their position: lights with size and environment maps.
+    bool needs_position(std::size_t light) const {
+        return std::holds_alternative<DiscLight>(lights_[light]) ||
+               std::holds_alternative<EnvironmentLight>(lights_[light]);
+    }
     bool can_be_hit(std::size_t light) const {
         return std::holds_alternative<DiscLight>(lights_[light]);
     }

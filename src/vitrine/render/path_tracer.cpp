@@ -2,6 +2,7 @@
 
 #include "optics/fresnel.h"
 #include "render/interface.h"
+#include "render/small_stack.h"
 
 namespace vitrine {
 namespace {
@@ -41,11 +42,7 @@ struct PathTracer::State {
     Vec3f receiver = Vec3f::Zero();
 };
 
-struct PathTracer::Pending {
-    static constexpr int kCapacity = 32;
-    State states[kCapacity];
-    int count = 0;
-};
+struct PathTracer::Pending : SmallStack<State, 32> {};
 
 PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
                        const TranslucentLight* translucent)
@@ -55,26 +52,23 @@ PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
                              const PathSampler& sampler, std::uint32_t view) const {
     PathResult result;
     Pending pending;
-    State& first = pending.states[pending.count++];
+    State first;
     first.origin = origin;
     first.direction = direction;
+    pending.push(first);
     finish(pending, sampler, view, result);
     return result;
 }
 
 void PathTracer::finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
                         PathResult& result) const {
-    while (pending.count > 0) {
-        const State state = pending.states[--pending.count];
-        follow(state, pending, sampler, view, result);
-    }
+    while (!pending.empty()) follow(pending.pop(), pending, sampler, view, result);
 }
 
 PathResult PathTracer::entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
                                 std::uint32_t view) const {
     PathResult result;
-    Pending pending;
-    State& state = pending.states[0];
+    State state;
     state.depth = 1;
     const Bsdf bsdf = EnteringBsdf{eta};
     const Frame frame(point.shading_normal);
@@ -83,7 +77,8 @@ PathResult PathTracer::entering(const ShadingPoint& point, float eta, const Path
     if (options_.direct_light_only) return result;
     add_secondary(state, point, bsdf, sampler, view, result);
     if (scatter(state, point, bsdf, frame, wo, sampler)) {
-        pending.count = 1;
+        Pending pending;
+        pending.push(state);
         finish(pending, sampler, view, result);
     }
     return result;
@@ -93,7 +88,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
                         std::uint32_t view, PathResult& result) const {
     while (true) {
         const Ray ray{state.origin, state.direction, 0.0f, 1e30f, view};
-        const Hit hit = scene_.accel().closest(ray);
+        const Hit hit = scene_.closest(ray);
         state.throughput *= scene_.transmittance(state.media, hit.is_hit() ? hit.distance : 1e30f);
         add_emission(state, hit.is_hit() ? hit.distance : 1e30f, result);
         if (!hit.is_hit()) {
@@ -178,11 +173,11 @@ void PathTracer::add_environment(const State& state, PathResult& result) const {
 }
 
 bool PathTracer::is_hidden(const Ray& ray, std::uint32_t view, PathResult& result) const {
-    if (!scene_.accel().is_occluded(ray)) return false;
+    if (!scene_.is_occluded(ray)) return false;
     if (view == kAllParts && !result.is_touched) {
         Ray real = ray;
         real.mask = kRealParts;
-        result.is_touched = !scene_.accel().is_occluded(real);
+        result.is_touched = !scene_.is_occluded(real);
     }
     return true;
 }
@@ -206,7 +201,9 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
     const Vec3f origin = scene_.leave_smooth(point);
     for (std::size_t i = begin; i < end; ++i) {
         const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
-        const auto s = lights.sample(i, origin, sampler.pair(state.depth, use));
+        const auto s = lights.sample(
+            i, origin,
+            lights.needs_position(i) ? sampler.pair(state.depth, use) : Vec2f(0.5f, 0.5f));
         if (!s) continue;
         const Vec3f wi = frame.to_local(s->direction);
         if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
@@ -373,10 +370,10 @@ bool PathTracer::pass_interface(State& state, const ShadingPoint& point, Pending
     }
     const float faint_share = std::min(f, 1 - f) * state.throughput.maxCoeff();
     if (!state.has_receiver && state.specular_bounces <= options_.split_depth &&
-        faint_share > kMinSplitShare && pending.count < Pending::kCapacity) {
+        faint_share > kMinSplitShare && !pending.is_full()) {
         reflected.throughput *= f;
         refracted.throughput *= (1 - f) * compression;
-        pending.states[pending.count++] = reflected;
+        pending.push(reflected);
         state = refracted;
         return true;
     }

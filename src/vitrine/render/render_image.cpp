@@ -15,7 +15,7 @@ Geometry render_geometry(const RenderScene& scene, const Camera& camera, std::ui
         const int y = static_cast<int>(row);
         for (int x = 0; x < camera.width; ++x) {
             const Vec3f direction = camera.ray_in_world(x, y).cast<float>();
-            const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, view});
+            const Hit hit = scene.closest({origin, direction, 0.0f, 1e30f, view});
             if (!hit.is_hit()) continue;
             const ShadingPoint point = scene.surface(hit, direction);
             geometry.z_m(x, y) = hit.distance * direction.dot(forward);

@@ -1,8 +1,10 @@
 #include "render/render_scene.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 
 #include <numeric>
+#include <span>
 
 namespace vitrine {
 namespace {
@@ -10,7 +12,7 @@ namespace {
 /// Ray epsilons between glass and what it stands on.
 constexpr float kContactGapEpsilons = 4.0f;
 
-Accel build_accel(const std::vector<Part>& parts) {
+Accel build_accel(std::span<const Part> parts) {
     std::vector<AccelPart> items;
     for (const Part& part : parts) {
         items.push_back({part.mesh, part.is_virtual ? kVirtualParts : kRealParts});
@@ -20,10 +22,14 @@ Accel build_accel(const std::vector<Part>& parts) {
 
 /// Moves the vertices of dielectric parts that coincide with an opaque surface inward by the gap.
 /// Returns true when a mesh was replaced.
-bool open_contact_gaps(Scene& scene, const Accel& accel, float epsilon) {
+/// @param first of the scene's parts to look at; the rays meet all
+/// @param closest of a ray in the scene
+template <typename Closest>
+bool open_contact_gaps(Scene& scene, std::size_t first, const Closest& closest, float epsilon) {
     const float gap = kContactGapEpsilons * epsilon;
     bool is_changed = false;
-    for (Part& part : scene.parts) {
+    for (std::size_t p = first; p < scene.parts.size(); ++p) {
+        Part& part = scene.parts[p];
         if (!std::holds_alternative<Dielectric>(part.material)) continue;
         const Mesh& mesh = *part.mesh;
         std::vector<Vec3f> moved = mesh.vertices;
@@ -46,7 +52,7 @@ bool open_contact_gaps(Scene& scene, const Accel& accel, float epsilon) {
                 ray.direction = n;
                 for (int tries = 0; tries < 4; ++tries) {  // past the glass itself
                     ray.max_distance = gap - (ray.origin - mesh.vertices[i]).dot(n);
-                    const Hit hit = accel.closest(ray);
+                    const Hit hit = closest(ray);
                     if (!hit.is_hit()) break;
                     const Part& other = scene.parts[static_cast<std::size_t>(hit.part)];
                     const Vec3f place = ray.origin + hit.distance * n;
@@ -92,24 +98,46 @@ void Media::leave(int part) {
 RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
     epsilon_ = static_cast<float>(ray_epsilon(scene_));
     accel_ = build_accel(scene_.parts);
-    if (open_contact_gaps(scene_, accel_, epsilon_)) accel_ = build_accel(scene_.parts);
-    for (const Part& part : scene_.parts) {
+    const auto closest_part = [this](const Ray& ray) { return accel_.closest(ray); };
+    if (open_contact_gaps(scene_, 0, closest_part, epsilon_)) accel_ = build_accel(scene_.parts);
+    lights_ = LightSampler(scene_.lights, scene_.ambient_radiance);
+    measure_parts();
+}
+
+RenderScene::RenderScene(const RenderScene& world, std::vector<Part> virtual_parts)
+    : RenderScene(world) {
+    VITRINE_CHECK(added_accel_.empty());
+    const std::size_t first = scene_.parts.size();
+    for (Part& part : virtual_parts) {
+        part.is_virtual = true;
+        scene_.parts.push_back(std::move(part));
+    }
+    const auto build = [&] {
+        added_accel_ = build_accel(std::span<const Part>(scene_.parts).subspan(first));
+    };
+    build();
+    const auto closest_part = [this](const Ray& ray) { return closest(ray); };
+    if (open_contact_gaps(scene_, first, closest_part, epsilon_)) build();
+    measure_parts();
+}
+
+void RenderScene::measure_parts() {
+    const Box3 box = bounds(scene_);
+    if (!box.is_empty()) {
+        bounding_sphere_ = {box.centre().cast<float>(), static_cast<float>(box.radius())};
+    }
+    for (std::size_t p = bodies_.size(); p < scene_.parts.size(); ++p) {
+        const Part& part = scene_.parts[p];
+        volumes_m3_.push_back(std::abs(volume(*part.mesh)));
         const auto* translucent = std::get_if<Translucent>(&part.material);
         const bool is_body = translucent && !part.mesh->empty();
         bodies_.push_back(is_body ? std::make_shared<TranslucentBody>(part.mesh, *translucent)
                                   : nullptr);
     }
-    lights_ = LightSampler(scene_.lights, scene_.ambient_radiance);
-    const Box3 box = bounds(scene_);
-    if (!box.is_empty()) {
-        bounding_sphere_ = {box.centre().cast<float>(), static_cast<float>(box.radius())};
-    }
-    std::vector<double> volumes;
-    for (const Part& part : scene_.parts) volumes.push_back(std::abs(volume(*part.mesh)));
-    std::vector<int> order(volumes.size());
+    std::vector<int> order(volumes_m3_.size());
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
-        return volumes[static_cast<std::size_t>(a)] < volumes[static_cast<std::size_t>(b)];
+        return volumes_m3_[static_cast<std::size_t>(a)] < volumes_m3_[static_cast<std::size_t>(b)];
     });
     medium_rank_.resize(order.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
@@ -133,7 +161,7 @@ Rgb RenderScene::transmittance(const Media& media, float distance) const {
 }
 
 ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {
-    const Mesh& mesh = *accel_.parts()[static_cast<std::size_t>(hit.part)].mesh;
+    const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
     ShadingPoint point;
     point.part = hit.part;
     point.distance = hit.distance;
@@ -143,7 +171,7 @@ ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) co
     point.geometric_normal = side * hit.normal;
     point.shading_normal = side * shading_normal(mesh, hit);
     point.smooth_position = point.position;
-    if (!mesh.normals.empty()) {
+    if (!mesh.normals.empty() && !dielectric(hit.part)) {
         // Hanika 2021, "Hacking the shadow terminator": the point seen from the tangent planes of
         // the vertices, lifted where these lie above it.
         const Triangle& t = mesh.triangles[static_cast<std::size_t>(hit.triangle)];

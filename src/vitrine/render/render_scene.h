@@ -52,9 +52,36 @@ class RenderScene {
     /// gap of a few ray epsilons (optical contact needs a liquid; a table has air in between), so
     /// that no ray slips through both surfaces at once.
     explicit RenderScene(Scene scene);
+    /// `world` and virtual parts beside it, which are `is_virtual` from here on. The world's
+    /// hierarchy is shared and not built again: takes milliseconds where the world took a second.
+    RenderScene(const RenderScene& world, std::vector<Part> virtual_parts);
 
     const Scene& scene() const { return scene_; }
+    /// Of the parts of the scene that was given, without those added later: rays ask `closest` and
+    /// `is_occluded`, which know all.
     const Accel& accel() const { return accel_; }
+    Hit closest(const Ray& ray) const {
+        Hit hit = accel_.closest(ray);
+        if (added_accel_.empty() || !(ray.mask & kVirtualParts)) return hit;
+        Ray nearer = ray;
+        if (hit.is_hit()) nearer.max_distance = hit.distance;
+        Hit added = added_accel_.closest(nearer);
+        if (!added.is_hit()) return hit;
+        added.part += static_cast<int>(accel_.parts().size());
+        return added;
+    }
+    bool is_occluded(const Ray& ray) const {
+        if (accel_.is_occluded(ray)) return true;
+        return !added_accel_.empty() && (ray.mask & kVirtualParts) && added_accel_.is_occluded(ray);
+    }
+    /// As `Accel::nearest`.
+    Hit nearest(const Vec3f& point, float max_distance) const {
+        const Hit hit = accel_.nearest(point, max_distance);
+        Hit added = added_accel_.nearest(point, hit.is_hit() ? hit.distance : max_distance);
+        if (!added.is_hit()) return hit;
+        added.part += static_cast<int>(accel_.parts().size());
+        return added;
+    }
     const LightSampler& lights() const { return lights_; }
     float epsilon() const { return epsilon_; }
     const Sphere& bounding_sphere() const { return bounding_sphere_; }
@@ -101,10 +128,14 @@ class RenderScene {
     }
 
   private:
+    void measure_parts();
+
     Scene scene_;
     Accel accel_;
+    Accel added_accel_;  // of the parts behind those of accel_
     LightSampler lights_;
     Sphere bounding_sphere_;
+    std::vector<double> volumes_m3_;
     std::vector<int> medium_rank_;
     std::vector<std::shared_ptr<const TranslucentBody>> bodies_;  // per part
     float epsilon_ = 1e-6f;

@@ -12,29 +12,45 @@ namespace vitrine {
 
 /// Point `index` of a (0, 2)-sequence, scrambled by `seed`: any 2^k points from 0 are stratified.
 inline Vec2f sobol_pair(std::uint32_t index, std::uint32_t seed) {
-    return {scrambled_sobol(index, 0, seed), scrambled_sobol(index, 1, seed)};
+    return scrambled_sobol_pair(index, seed);
 }
 
 class PathSampler {
   public:
     /// @param stream key of the pixel or photon set; @param index of the sample within it
-    PathSampler(std::uint64_t stream, std::uint32_t index) : stream_(stream), index_(index) {}
+    PathSampler(std::uint64_t stream, std::uint32_t index)
+        : mixed_stream_(mix_bits(stream)), index_(index) {}
 
     /// Pair for use `purpose` at vertex `depth`; stratified over `index` for the first vertices.
     Vec2f pair(int depth, int purpose) const {
-        const std::uint64_t key =
-            stream_key(stream_, static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose));
+        const std::uint64_t key = key_of(depth, purpose);
         if (depth <= kStratifiedDepth) return sobol_pair(index_, static_cast<std::uint32_t>(key));
-        const std::uint64_t bits = mix_bits(key ^ (std::uint64_t{index_} << 32 | index_));
+        const std::uint64_t bits = bits_of(key);
         return {static_cast<float>(bits >> 40) * 0x1p-24f,
                 static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
     }
-    float number(int depth, int purpose) const { return pair(depth, purpose).x(); }
+    /// The first of the pair.
+    float number(int depth, int purpose) const {
+        const std::uint64_t key = key_of(depth, purpose);
+        if (depth <= kStratifiedDepth) {
+            return scrambled_sobol(index_, 0, static_cast<std::uint32_t>(key));
+        }
+        return static_cast<float>(bits_of(key) >> 40) * 0x1p-24f;
+    }
 
   private:
     // Beyond the second diffuse bounce stratification buys nothing measurable.
     static constexpr int kStratifiedDepth = 3;
-    std::uint64_t stream_;
+    std::uint64_t key_of(int depth,
+                         int purpose) const {  // = stream_key(stream, 16 depth + purpose)
+        return mix_bits(mixed_stream_ ^
+                        (static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose)));
+    }
+    std::uint64_t bits_of(std::uint64_t key) const {
+        return mix_bits(key ^ (std::uint64_t{index_} << 32 | index_));
+    }
+
+    std::uint64_t mixed_stream_;
     std::uint32_t index_;
 };
 

@@ -72,7 +72,7 @@ class BodyGatherer {
             if (((p - box.min).array() < -reach).any() || ((box.max - p).array() < -reach).any()) {
                 return;
             }
-            if (scene_.accel().nearest(photon.position, reach).part != part_) return;
+            if (scene_.nearest(photon.position, reach).part != part_) return;
             owner[i] = body_.nearest_sample(photon.position, photon.normal.unpack());
         });
         for (std::size_t i = 0; i < photons.size(); ++i) {
@@ -123,7 +123,7 @@ class BodyGatherer {
             ray.max_distance = depth + kContactEpsilons * step;
             int crossings = 0;
             for (int k = 0; k < kMaxCrossings; ++k) {
-                const Hit hit = scene_.accel().closest(ray);
+                const Hit hit = scene_.closest(ray);
                 if (!hit.is_hit()) break;
                 if (hit.part != part_ && !scene_.dielectric(hit.part)) {
                     crossings += hit.normal.dot(n) < 0 ? 1 : -1;
@@ -137,7 +137,7 @@ class BodyGatherer {
 
     float own_thickness(Ray ray) const {
         for (int k = 0; k < kMaxCrossings; ++k) {
-            const Hit hit = scene_.accel().closest(ray);
+            const Hit hit = scene_.closest(ray);
             if (!hit.is_hit()) return 0.0f;
             if (hit.part == part_) return hit.distance;
             ray.min_distance = hit.distance + 0.1f * scene_.epsilon();
