@@ -45,7 +45,7 @@ Escape random_walks(double radius, double single_albedo, double bin_width, int w
 
 TEST(CurvedBody, PredictsWhatRandomWalksLoseInBalls) {
     constexpr double kBin = 0.25;  // mean free paths
-    constexpr int kWalks = 30000;
+    constexpr int kWalks = 12000;
     for (const double single_albedo : {0.6, 0.92}) {
         const Escape flat = random_walks(2000, single_albedo, kBin, kWalks);
         const CurvedBodyFactor factor = curved_body_factor(flat.total);

@@ -74,7 +74,7 @@ std::vector<float> visibility(const Relief& relief, const SurfacePoints& points,
 
 SkyShares sky_shares(const Relief& relief, const SurfacePoints& points, int direction_count) {
     const std::size_t count = points.position.size();
-    std::vector<float> cosines(count, 0.0f);
+    std::vector<float> cosines(count, 0.0f), below(count, 0.0f);
     SkyShares shares{std::vector<float>(count, 0.0f), std::vector<float>(count, 0.0f)};
     for (const Vec3& direction : fibonacci_directions(direction_count, -1.0)) {
         const std::vector<float> seen = visibility(relief, points, direction);
@@ -83,13 +83,15 @@ SkyShares sky_shares(const Relief& relief, const SurfacePoints& points, int dire
             const float cosine = std::max(0.0f, points.normal[i].dot(w));
             cosines[i] += cosine;
             shares.ambient[i] += cosine * seen[i];
-            if (w.y() < 0) shares.below[i] += cosine * seen[i];
+            if (w.y() >= 0) continue;
+            below[i] += cosine;
+            shares.below[i] += cosine * seen[i];
         }
     }
     for (std::size_t i = 0; i < count; ++i) {
-        const float norm = std::max(cosines[i], 1e-6f);
-        shares.ambient[i] /= norm;
-        shares.below[i] /= norm;
+        shares.ambient[i] /= std::max(cosines[i], 1e-6f);
+        // Directions only say which part is hidden; what an open surface gets is known exactly.
+        shares.below[i] *= facing_down(points.normal[i]) / std::max(below[i], 1e-6f);
     }
     return shares;
 }
