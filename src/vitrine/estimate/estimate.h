@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 
 namespace vitrine {
 
@@ -17,10 +18,19 @@ std::string outcome_name(Outcome outcome);
 /// @throws InternalError for another word.
 Outcome outcome_from_name(const std::string& name);
 
+/// Zero of a number or a colour: Eigen's types leave `T{}` uninitialised.
+template <typename T>
+T zero_quantity() {
+    if constexpr (std::is_arithmetic_v<T>)
+        return T{0};
+    else
+        return T::Zero();
+}
+
 template <typename T>
 struct Estimate {
-    T value{};
-    T stddev{};
+    T value = zero_quantity<T>();
+    T stddev = zero_quantity<T>();
     double residual_rms = 0.0;
     Outcome outcome = Outcome::NotIdentifiable;
     std::string reason;  ///< one sentence when the outcome is not Converged

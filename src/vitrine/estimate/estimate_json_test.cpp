@@ -5,7 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <filesystem>
+#include <memory>
+#include <new>
 
 namespace vitrine {
 namespace {
@@ -46,6 +49,16 @@ SceneEstimate example() {
     e.error_initial = 0.02;
     e.error_joint = 0.01;
     return e;
+}
+
+TEST(Estimate, StartsAtZeroWhateverTheMemoryHeld) {
+    alignas(Estimate<Rgb>) std::array<unsigned char, sizeof(Estimate<Rgb>)> memory;
+    memory.fill(0x7f);
+    auto* estimate = new (memory.data()) Estimate<Rgb>;
+    EXPECT_TRUE((estimate->value == 0.0f).all());
+    EXPECT_TRUE((estimate->stddev == 0.0f).all());
+    EXPECT_EQ(estimate->outcome, Outcome::NotIdentifiable);
+    std::destroy_at(estimate);
 }
 
 TEST(EstimateJson, RoundTrip) {
