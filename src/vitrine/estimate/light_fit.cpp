@@ -97,9 +97,9 @@ LightScore LightFit::score_at(const LightColumns& columns, int stride, int chann
     const double bright = sorted[9 * n / 10];
     if (bright <= 0.0) return result;
 
-    double intensity = 0.0;
-    bool is_anchored = false;
-    if (reference_) {
+    double intensity = is_intensity_known_ ? 1.0 : 0.0;
+    bool is_anchored = is_intensity_known_;
+    if (reference_ && !is_intensity_known_) {
         const double e = columns.clear[n] + b * at_reference_.openness[0];
         const double wanted = kPi * channel_of(reference_->radiance, channel) /
                                   channel_of(reference_->albedo, channel) -

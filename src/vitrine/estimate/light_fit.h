@@ -44,6 +44,9 @@ class LightFit {
              const std::optional<ReferenceSample>& reference, std::uint32_t opaque_mask,
              std::uint32_t see_through_mask, std::uint64_t seed);
 
+    /// From here on the columns' weights are the lights' true intensities: the scale is not fitted.
+    void know_intensity() { is_intensity_known_ = true; }
+
     /// Irradiance of one light of 1 W/sr at every `stride`-th sample (and the reference).
     DirectColumn column(const TrialLight& light, int disc_samples, int stride) const;
 
@@ -71,6 +74,7 @@ class LightFit {
     std::vector<std::vector<float>> log_radiance_;  // [channel][sample]
     std::vector<float> weight_;
     GatheredLight at_reference_;
+    bool is_intensity_known_ = false;
 };
 
 }  // namespace vitrine

@@ -1,6 +1,7 @@
 #include "estimate/lights.h"
 
 #include "base/log.h"
+#include "estimate/known_lights.h"
 #include "estimate/light_data.h"
 #include "estimate/light_search.h"
 #include "math/optimise.h"
@@ -142,25 +143,17 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
     LightEstimate estimate = data.start_estimate();
     if (!data.problem.empty()) return estimate;
     const ScanSamples& samples = data.samples;
-    const LightFit fit(data.world, samples, data.reference, data.opaque_mask, data.see_through_mask,
-                       options.seed);
+    LightFit fit(data.world, samples, data.reference, data.opaque_mask, data.see_through_mask,
+                 options.seed);
+    if (!options.known_lights.empty()) {
+        use_known_lights(fit, options.known_lights, estimate);
+        progress.update(1.0);
+        return estimate;
+    }
     progress.update(0.15, "searching the hemisphere");
 
     LightSet set;
-    std::vector<DiscLight> known;
-    for (const Light& light : options.known_lights) {
-        if (const auto* disc = std::get_if<DiscLight>(&light)) {
-            known.push_back(*disc);
-        } else if (const auto* point = std::get_if<PointLight>(&light)) {
-            known.push_back({point->position_m,
-                             (samples.reference_point - point->position_m).normalized(), 1e-3,
-                             point->intensity_w_per_sr});
-        }
-    }
-    if (!known.empty()) {
-        set = refine_lights(fit, from_lights(known, samples.reference_point),
-                            {.max_evaluations = 60, .keep_geometry = true});
-    } else if (options.start && !options.start->empty()) {
+    if (options.start && !options.start->empty()) {
         const RefineOptions refine =
             options.keep_start ? RefineOptions{.max_evaluations = 60, .keep_geometry = true}
                                : RefineOptions{.max_evaluations = 160, .step_rad = 0.03};

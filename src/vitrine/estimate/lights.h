@@ -20,7 +20,7 @@ struct LightOptions {
     SampleOptions samples;
     std::optional<ReferenceAlbedo> reference_albedo;  ///< fixes the scale; else mean albedo 0.5
     std::vector<ObjectClass> object_classes;  ///< what is known of each candidate; empty: nothing
-    std::vector<Light> known_lights;          ///< from the user: geometry kept, strength fitted
+    std::vector<Light> known_lights;          ///< from the user: all there are, taken as they are
     std::optional<std::vector<DiscLight>> start;  ///< refine from here instead of searching
     bool keep_start =
         false;  ///< lights of `start` stay where they are: only their strength is fitted
@@ -42,7 +42,7 @@ struct LightEstimate {
     SupportPlane plane;
     std::vector<FittedLight> lights;
     Rgb ambient_radiance = Rgb::Zero();
-    std::string albedo_anchor;   ///< "reference_albedo" or "mean_albedo"
+    std::string albedo_anchor;   ///< "reference_albedo", "mean_albedo" or "known_lights"
     double error_initial = 0.0;  ///< robust photometric cost of the best grid light, in [0, 1]
     double error_refined = 0.0;
     double residual_rms = 0.0;            ///< relative, of the inliers
@@ -58,6 +58,7 @@ struct LightEstimate {
 /// `scene.cameras` pair with `frames`. Candidates count as opaque when known specular or diffuse,
 /// and as unknown see-through bodies otherwise: what lies in their shadow then says nothing.
 /// Costs about 6 s for 14 frames on two cores.
+/// @throws InputError when a known light is a spot or an environment
 LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> frames,
                               double saturation_level, const LightOptions& options = {},
                               const Progress& progress = {});

@@ -1,5 +1,6 @@
 #include "estimate/lights.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "estimate/light_search.h"
 #include "geometry/primitives.h"
@@ -118,6 +119,35 @@ TEST(EstimateLights, TellsTwoLampsFromOne) {
     const bool is_a_first = error_deg(e.lights[0], a) < error_deg(e.lights[0], b);
     EXPECT_LT(error_deg(e.lights[is_a_first ? 0 : 1], a), 2.0);
     EXPECT_LT(error_deg(e.lights[is_a_first ? 1 : 0], b), 2.0);
+}
+
+TEST(EstimateLights, KnownLightsAreTakenAsTheyAre) {
+    const DiscLight lamp = aimed(Vec3(0.4, 0.3, 0.6), 0.04, 3.0f);
+    const World world = make_world({lamp}, 0.05f);
+    LightOptions options = small_options();
+    options.known_lights = {lamp};
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, options);
+    ASSERT_EQ(e.lights.size(), 1u);
+    EXPECT_EQ(e.lights[0].light.position_m, lamp.position_m);
+    EXPECT_EQ(e.lights[0].light.radius_m, lamp.radius_m);
+    EXPECT_TRUE((e.lights[0].light.intensity_w_per_sr == 3.0f).all());
+    EXPECT_EQ(e.lights[0].stddev_direction_deg, 0.0);
+    EXPECT_EQ(e.outcome, Outcome::Converged);
+    EXPECT_EQ(e.albedo_anchor, "known_lights");
+    EXPECT_NEAR(e.ambient_radiance[1], 0.05, 0.02);
+
+    const DirectionalLight sun{Vec3(0, 0.6, -0.8), Rgb::Constant(2.5f)};
+    options.known_lights = {sun, PointLight{Vec3(-0.5, 0.2, 0.7), Rgb(1.0f, 2.0f, 3.0f)}};
+    const LightEstimate both = estimate_lights(world.scene, world.frames, 1e9, options);
+    const std::vector<Light> lights = to_lights(both);
+    ASSERT_EQ(lights.size(), 2u);
+    EXPECT_LT((std::get<DirectionalLight>(lights[0]).direction - sun.direction).norm(), 1e-9);
+    EXPECT_NEAR(std::get<DirectionalLight>(lights[0]).irradiance_w_per_m2[0], 2.5, 1e-4);
+    EXPECT_EQ(std::get<DiscLight>(lights[1]).position_m, Vec3(-0.5, 0.2, 0.7));
+    EXPECT_TRUE((std::get<DiscLight>(lights[1]).intensity_w_per_sr == Rgb(1, 2, 3)).all());
+
+    options.known_lights = {SpotLight{}};
+    EXPECT_THROW(estimate_lights(world.scene, world.frames, 1e9, options), InputError);
 }
 
 TEST(EstimateLights, SaysWhenEverythingIsClipped) {

@@ -18,7 +18,7 @@ namespace vitrine {
 /// What the user knows (overrides file, interfaces.md 2).
 struct Overrides {
     std::vector<ObjectOverride> objects;
-    std::vector<Light> lights;  ///< geometry kept; strength still fitted
+    std::vector<Light> lights;  ///< all there are, taken as they are
 };
 
 enum class EstimateMethod {

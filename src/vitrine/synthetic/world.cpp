@@ -5,6 +5,7 @@
 #include "geometry/primitives.h"
 #include "image/colour.h"
 #include "render/render_image.h"
+#include "synthetic/world_shapes.h"
 #include "trace/accel.h"
 
 #include <algorithm>
@@ -61,25 +62,38 @@ Mesh subdivided(Mesh mesh, double edge_m) {
 }
 
 /// Patches of paint over a slow wave: what a desk mat looks like.
-Rgb table_albedo(const Vec3f& p, std::uint64_t seed) {
+Rgb table_albedo(const Vec3f& p, const WorldOptions& options) {
     constexpr float kPatch = 0.035f;
     const auto cell = [](float x) {
         return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / kPatch)));
     };
-    Rng patch(stream_key(seed, cell(p.x()), cell(p.y())));
+    Rng patch(stream_key(options.seed, cell(p.x()), cell(p.y())));
     const float wave = 0.04f * (std::sin(23.0f * p.x() + 9.0f * p.y()) + std::sin(31.0f * p.y()));
     const float paint = patch.next_float() < 0.3f ? 0.16f * (patch.next_float() - 0.5f) : 0.0f;
-    return Rgb(0.42f, 0.37f, 0.31f) + wave + paint;
+    return Rgb(0.42f, 0.37f, 0.31f) + static_cast<float>(options.texture) * (wave + paint);
 }
 
-Mesh make_scan_mesh(Rng& rng, std::uint64_t seed) {
+/// A board on the table that shades what stands at the origin from a lamp.
+Mesh make_screen(const Vec3& lamp) {
+    constexpr double kAway = 0.11, kWidth = 0.2, kThickness = 0.01;  // metres
+    constexpr double kShadedRadius = 0.06, kShadedHeight = 0.13;     // of what stands there
+    const double across = std::hypot(lamp.x(), lamp.y());
+    const double height = kShadedHeight + (kAway + kShadedRadius) * lamp.z() / across;
+    const Mesh board = make_box(Vec3(kThickness, kWidth, height), Vec3(kAway, 0, 0.5 * height));
+    Mat4 turn = Mat4::Identity();
+    const double c = lamp.x() / across, s = lamp.y() / across;
+    turn.topLeftCorner<2, 2>() << c, -s, s, c;
+    return transformed(board, turn);
+}
+
+Mesh make_scan_mesh(Rng& rng, const WorldOptions& options) {
     Mesh scan = make_plane(1.1, 0.0, 180);
     scan.uv.clear();
     scan.normals.clear();
     std::vector<Rgb> albedo;
-    for (const Vec3f& p : scan.vertices) albedo.push_back(table_albedo(p, seed));
+    for (const Vec3f& p : scan.vertices) albedo.push_back(table_albedo(p, options));
     const double turn = between(rng, 0, 360);
-    for (int k = 0; k < 3; ++k) {
+    for (int k = 0; k < options.body_count; ++k) {
         const Vec3 place =
             on_hemisphere(0, turn + 120 * k + between(rng, -20, 20), between(rng, 0.17, 0.25));
         const double height = between(rng, 0.05, 0.12);
@@ -93,41 +107,59 @@ Mesh make_scan_mesh(Rng& rng, std::uint64_t seed) {
         append(scan, subdivided(std::move(body), 0.012));
         albedo.resize(scan.vertices.size(), paint);
     }
+    if (options.is_shaded && !options.lamps.empty()) {
+        append(scan, subdivided(make_screen(options.lamps[0].position_m), 0.012));
+        albedo.resize(scan.vertices.size(), Rgb(0.5f, 0.5f, 0.5f));
+    }
     scan.normals.clear();
     scan.colours = std::move(albedo);
     return with_creased_normals(scan, 30.0);
 }
 
-Part make_object(Rng& rng, const WorldOptions& options) {
+Material random_material(Rng& rng, const WorldOptions& options) {
+    if (options.object == WorldObject::Glass || options.object == WorldObject::Vessel) {
+        const double ior = between(rng, 1.35, 1.65);
+        Rgb sigma_a;
+        for (int c = 0; c < 3; ++c)
+            sigma_a[c] = static_cast<float>(between(rng, 0, c == 1 ? 6 : 12));
+        return Dielectric{ior, sigma_a};
+    }
+    Ward ward;
+    const bool is_metal = options.object == WorldObject::Metal;
+    for (int c = 0; c < 3; ++c) {
+        ward.rho_d[c] =
+            static_cast<float>(is_metal ? between(rng, 0.03, 0.2) : between(rng, 0.03, 0.08));
+        ward.rho_s[c] = static_cast<float>(is_metal ? options.rho_s_scale * between(rng, 0.25, 0.5)
+                                                    : between(rng, 0.02, 0.04));
+    }
+    ward.sigma_x = ward.sigma_y = is_metal ? between(rng, 0.06, 0.2) : between(rng, 0.2, 0.35);
+    return ward;
+}
+
+/// The object as it is, its material included, and its hull.
+struct Object {
     Part part;
-    part.name = "object_0";
+    std::shared_ptr<const Mesh> hull;
+    double wall_m = 0.0;
+};
+
+Object make_object(Rng& rng, const WorldOptions& options) {
+    Object object;
+    object.part.name = "object_0";
     const double radius = between(rng, 0.035, 0.05);
-    Mesh mesh;
-    if (rng.next_double() < 0.5) {
-        mesh = make_sphere(radius, Vec3(0, 0, radius + 5e-4), 64);
+    if (options.object == WorldObject::Vessel) {
+        Vessel vessel = make_vessel(radius, rng);
+        object.part.mesh = std::make_shared<const Mesh>(std::move(vessel.glass));
+        object.hull = std::make_shared<const Mesh>(std::move(vessel.hull));
+        object.wall_m = vessel.wall_m;
     } else {
-        // A bottle without a neck: shoulders bend light as a sphere does, sides as a cylinder.
-        mesh = make_lathe({Vec2(0, 5e-4), Vec2(0.9 * radius, 6e-4), Vec2(radius, 0.006),
-                           Vec2(radius, 1.4 * radius), Vec2(0.8 * radius, 1.9 * radius),
-                           Vec2(0.45 * radius, 2.2 * radius), Vec2(0, 2.3 * radius)},
-                          128);
+        object.part.mesh =
+            std::make_shared<const Mesh>(make_world_shape(options.shape, radius, rng));
+        object.hull = object.part.mesh;
     }
-    part.mesh = std::make_shared<const Mesh>(std::move(mesh));
-    if (options.object == WorldObject::Glass) {
-        part.material =
-            Dielectric{between(rng, 1.35, 1.65), Rgb(static_cast<float>(between(rng, 0, 12)),
-                                                     static_cast<float>(between(rng, 0, 6)),
-                                                     static_cast<float>(between(rng, 0, 12)))};
-    } else {
-        Ward ward;
-        for (int c = 0; c < 3; ++c) {
-            ward.rho_d[c] = static_cast<float>(between(rng, 0.03, 0.2));
-            ward.rho_s[c] = static_cast<float>(options.rho_s_scale * between(rng, 0.25, 0.5));
-        }
-        ward.sigma_x = ward.sigma_y = between(rng, 0.06, 0.2);
-        part.material = ward;
-    }
-    return part;
+    object.part.material = random_material(rng, options);
+    if (options.material) object.part.material = *options.material;
+    return object;
 }
 
 Camera make_camera(const WorldOptions& options, int view) {
@@ -144,9 +176,21 @@ Camera make_camera(const WorldOptions& options, int view) {
     return camera;
 }
 
-Rgb as_recorded(const Rgb& radiance, const WorldOptions& options) {
+/// Two uniform numbers give one normal one (Box and Muller 1958).
+float normal_deviate(Rng& rng) {
+    const float u = 1.0f - rng.next_float(), v = rng.next_float();
+    return std::sqrt(-2.0f * std::log(u)) * std::cos(2.0f * kPif * v);
+}
+
+Rgb as_recorded(const Rgb& radiance, const WorldOptions& options, Rng& rng) {
     const auto level = static_cast<float>(options.saturation_level);
     Rgb recorded = radiance.max(0.0f).min(level);
+    if (options.sensor_noise > 0.0) {
+        for (int c = 0; c < 3; ++c)
+            recorded[c] += static_cast<float>(options.sensor_noise) *
+                           std::sqrt(level * recorded[c]) * normal_deviate(rng);
+        recorded = recorded.max(0.0f).min(level);
+    }
     if (options.is_quantised)
         for (int c = 0; c < 3; ++c)
             recorded[c] =
@@ -165,12 +209,13 @@ std::vector<Rgb> observed_colours(const Scene& scene, const std::vector<RgbdFram
     parallel_for(colours.size(), 256, [&](std::size_t i) {
         const Vec3f origin = scan.vertices[i] + 2e-3f * scan.normals[i];
         std::vector<Rgb> seen;
-        for (const RgbdFrame& frame : frames) {
-            const Vec3f eye = frame.camera.centre_in_world().cast<float>();
-            const Vec2 pixel = frame.camera.project(scan.vertices[i].cast<double>());
-            if (!frame.camera.sees(pixel, 1.0) || scan.normals[i].dot(eye - origin) <= 0) continue;
+        for (std::size_t f = 0; f < frames.size(); ++f) {
+            const Camera& camera = scene.cameras[f];
+            const Vec3f eye = camera.centre_in_world().cast<float>();
+            const Vec2 pixel = camera.project(scan.vertices[i].cast<double>());
+            if (!camera.sees(pixel, 1.0) || scan.normals[i].dot(eye - origin) <= 0) continue;
             if (accel.is_occluded({origin, eye - origin, 0.0f, 1.0f})) continue;
-            seen.push_back(bilinear(frame.colour, pixel.x(), pixel.y()));
+            seen.push_back(bilinear(frames[f].colour, pixel.x(), pixel.y()));
         }
         if (seen.empty()) return;
         std::sort(seen.begin(), seen.end(),
@@ -178,6 +223,52 @@ std::vector<Rgb> observed_colours(const Scene& scene, const std::vector<RgbdFram
         colours[i] = seen[seen.size() / 2];
     });
     return colours;
+}
+
+/// Where `amount(p)` says how much of the error there is.
+template <typename Amount>
+Mesh displaced(Mesh mesh, const DisplacementField& field, const Amount& amount) {
+    for (Vec3f& v : mesh.vertices) v += amount(v) * field(v);
+    return mesh;
+}
+
+/// The truth without its lights and materials, as far off as the options say.
+Scene as_reconstructed(const World& world, const std::shared_ptr<const Mesh>& hull,
+                       const WorldOptions& options) {
+    constexpr double kTurnArm = 0.5;  // metres: a turn by error / arm moves what is there alike
+    constexpr float kFoot = 0.01f;    // metres: bodies stand on the table, which fuses to a plane
+    Rng rng(stream_key(options.seed, 0xe4404ULL));
+    Scene scene = world.truth;
+    scene.lights.clear();
+    scene.ambient_radiance = Rgb::Zero();
+    if (options.scan_error_m > 0.0) {
+        const DisplacementField field(options.scan_error_m, 0.02, 0.08, rng);
+        Mesh scan = displaced(*scene.parts[0].mesh, field,
+                              [](const Vec3f& v) { return std::clamp(v.z() / kFoot, 0.0f, 1.0f); });
+        scan.normals.clear();
+        scene.parts[0].mesh = std::make_shared<const Mesh>(with_creased_normals(scan, 30.0));
+    }
+    if (scene.parts.size() > 1) {
+        scene.parts[1].material = Diffuse{};
+        scene.parts[1].mesh = hull;
+        if (options.hull_error_m > 0.0) {
+            const DisplacementField field(options.hull_error_m, 0.03, 0.08, rng);
+            Mesh bent = displaced(*hull, field, [](const Vec3f&) { return 1.0f; });
+            bent.normals.clear();
+            scene.parts[1].mesh = std::make_shared<const Mesh>(with_creased_normals(bent, 40.0));
+        }
+    }
+    for (Camera& camera : scene.cameras) {
+        if (options.pose_error_m == 0.0) continue;
+        const double per_axis = options.pose_error_m / std::sqrt(3.0);
+        Vec3 shift, turn;
+        for (int a = 0; a < 3; ++a) {
+            shift[a] = per_axis * normal_deviate(rng);
+            turn[a] = per_axis / kTurnArm * normal_deviate(rng);
+        }
+        camera.cam_from_world = rigid_from_twist(turn, shift) * camera.cam_from_world;
+    }
+    return scene;
 }
 
 /// The best lit spot of the table near the middle as frame 0 sees it, and its mean albedo there.
@@ -222,15 +313,35 @@ World make_world(const WorldOptions& options) {
     Diffuse vertex;
     vertex.use_vertex_colours = true;
     scan.material = vertex;
-    scan.mesh = std::make_shared<const Mesh>(make_scan_mesh(rng, options.seed));
+    scan.mesh = std::make_shared<const Mesh>(make_scan_mesh(rng, options));
     world.truth.parts.push_back(scan);
-    if (options.object != WorldObject::None) world.truth.parts.push_back(make_object(rng, options));
+    Object object;
+    if (options.object != WorldObject::None) {
+        object = make_object(rng, options);
+        world.truth.parts.push_back(object.part);
+        world.wall_m = object.wall_m;
+    }
     const double azimuth = between(rng, 0, 360);
     for (int k = 0; k < options.light_count; ++k)
         world.lights.push_back(random_lamp(rng, azimuth + k * between(rng, 80, 180),
                                            k == 0 ? between(rng, 2.5, 3.5) : between(rng, 1.2, 2)));
+    if (!options.lamps.empty()) world.lights = options.lamps;
     world.truth.lights.assign(world.lights.begin(), world.lights.end());
-    world.truth.ambient_radiance = Rgb::Constant(static_cast<float>(between(rng, 0.0, 0.07)));
+    if (options.is_sunny) {
+        constexpr double kSunDistance = 1000.0;  // metres
+        const DiscLight lamp = world.lights[0];
+        const auto d2 = static_cast<float>(lamp.position_m.squaredNorm());
+        const Rgb irradiance = lamp.intensity_w_per_sr / d2;
+        world.lights = {lamp};
+        world.lights[0].position_m *= kSunDistance / lamp.position_m.norm();
+        world.lights[0].radius_m = 0.0;
+        world.lights[0].intensity_w_per_sr =
+            irradiance * static_cast<float>(kSunDistance * kSunDistance);
+        world.truth.lights = {DirectionalLight{lamp.normal, irradiance}};
+    }
+    const double ambient = between(rng, 0.0, 0.07);
+    world.truth.ambient_radiance =
+        options.ambient_radiance.value_or(Rgb::Constant(static_cast<float>(ambient)));
     for (int view = 0; view < options.view_count; ++view)
         world.truth.cameras.push_back(make_camera(options, view));
 
@@ -247,7 +358,8 @@ World make_world(const WorldOptions& options) {
         frame.camera = camera;
         final.seed = stream_key(options.seed, world.capture.frames.size());
         frame.colour = render_image(render, camera, &maps, final).radiance;
-        for (Rgb& pixel : frame.colour) pixel = as_recorded(pixel, options);
+        Rng noise(stream_key(options.seed, 0x5e504ULL, world.capture.frames.size()));
+        for (Rgb& pixel : frame.colour) pixel = as_recorded(pixel, options, noise);
         frame.depth_m = render_geometry(render, camera).z_m;
         world.capture.frames.push_back(std::move(frame));
     }
@@ -255,13 +367,10 @@ World make_world(const WorldOptions& options) {
     world.capture.saturation_level = options.saturation_level;
     world.capture.has_poses = true;
 
-    world.labelled = world.truth;
-    world.labelled.lights.clear();
-    world.labelled.ambient_radiance = Rgb::Zero();
-    Mesh observed = *scan.mesh;
+    world.labelled = as_reconstructed(world, object.hull, options);
+    Mesh observed = *world.labelled.parts[0].mesh;
     observed.colours = observed_colours(world.labelled, world.capture.frames);
     world.labelled.parts[0].mesh = std::make_shared<const Mesh>(std::move(observed));
-    if (world.labelled.parts.size() > 1) world.labelled.parts[1].material = Diffuse{};
 
     world.capture.reference_albedo = known_albedo(render, world.capture);
     return world;
