@@ -71,8 +71,7 @@ int main(int argc, char** argv) {
                    compared(fit.rho_d, p.rho_d), compared(fit.rho_s, p.rho_s),
                    compared(fit.sigma.value, p.sigma), fit.residual_rms, fit.sample_count,
                    samples.size(), outcome_name(fit.sigma.outcome));
-        write_text_file(out / (std::string(p.name) + ".svg"),
-                              residual_plot(samples, fit, p.name));
+        write_text_file(out / (std::string(p.name) + ".svg"), residual_plot(samples, fit, p.name));
     }
     fmt::print("residual plots: {}\n", out.string());
 }

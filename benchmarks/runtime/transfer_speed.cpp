@@ -50,8 +50,7 @@ Photo resized(const Photo& photo, double pixels) {
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const double u = (x + 0.5) / factor - 0.5, v = (y + 0.5) / factor - 0.5;
-            result.linear(x, y) =
-                bilinear(photo.linear, u, v);
+            result.linear(x, y) = bilinear(photo.linear, u, v);
             const int column =
                 std::clamp(static_cast<int>(std::lround(u)), 0, photo.mask.width() - 1);
             const int row =

@@ -93,7 +93,8 @@ TEST_F(TransferTest, ScalingKeepsTheMeanColourWhenAsked) {
     const Rgbd kept = mean(session.render(profile, look).diffuse);
     EXPECT_LT((kept / plain - 1).abs().maxCoeff(), 1e-3);
     look.keep_colour = false;
-    // Light leaves a closed body of longer paths after fewer scatterings, so less of it is absorbed.
+    // Light leaves a closed body of longer paths after fewer scatterings, so less of it is
+    // absorbed.
     EXPECT_GT(mean(session.render(profile, look).diffuse)[0], 1.01 * plain[0]);
 }
 

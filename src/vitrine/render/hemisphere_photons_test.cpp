@@ -52,8 +52,8 @@ TEST(HemispherePhotons, DensityIsTheIrradianceOfAnOpenTable) {
     options.albedo = 0.0f;  // direct light only: known in closed form
     const PhotonTree tree(trace_hemisphere_photons(world, light, -light.normalized(), options));
     std::vector<SurfacePoint> points;
-    // Apart by more than a neighbourhood of 200 photons, so that their noise is averaged out, and on
-    // the lamp's side of the box.
+    // Apart by more than a neighbourhood of 200 photons, so that their noise is averaged out, and
+    // on the lamp's side of the box.
     for (int k = 0; k < 144; ++k)
         points.push_back({Vec3f(-0.42f + 0.03f * static_cast<float>(k % 12),
                                 -0.42f + 0.075f * static_cast<float>(k / 12), 0),
