@@ -93,8 +93,8 @@ refused([*source(photo, png("dot.png", lambda x, y: [255 if (x, y) == (9, 9) els
 refused([*source(photo, png("other.png", lambda x, y: [255 if x > 30 else 0], 1, size=90)), *target],
         "other.png", "120 x 120", "90 x 90")
 # A mask that lies on the background, beside the object: black there.
-beside = png("beside.png", lambda x, y: [255 if x < 40 and y < 40 and not is_object(x, y) else 0], 1)
-black = png("black_around.png", lambda x, y: picture(x, y) if is_object(x, y) else [0, 0, 0])
+beside = png("beside.png", lambda x, y: [255 if 112 < x < 192 and 112 < y < 192 else 0], 1, size=200)
+black = png("black_around.png", lambda x, y: picture(x, y) if is_object(x, y) else [0, 0, 0], size=200)
 said = taken([*source(black, beside), *target], "beside", codes=(4,))
 case.expect("dark" in said or "black" in said, f"a mask beside the object is said: {said}")
 
@@ -121,6 +121,7 @@ for name, data in (("cut.png", photo.read_bytes()[:300]),
     refused([*source(case.scratch / name), *target], name)
 refused([*source(photo, case.scratch / "cut.png"), *target], "cut.png")
 refused(["--source", photo, "--source-box", "100,100,50,50", *target], "photo.png", "120 x 120")
-(case.scratch / "material.json").write_text('{"schema": "vitrine.translucent/1", "profil": {}}')
-refused(["--material", case.scratch / "material.json", *target], "material.json", "profile")
+(case.scratch / "material.json").write_text(
+    '{"schema": "vitrine.translucent/1", "inradius_px": 50, "fitted": {}}')
+refused(["--material", case.scratch / "material.json", *target], "material.json", '"fit"')
 case.finish()
