@@ -1,5 +1,6 @@
 #include "base/parallel.h"
 #include "estimate/scene_estimate.h"
+#include "estimate/vessel.h"
 #include "render/estimation_caustic.h"
 
 #include <algorithm>
@@ -133,7 +134,7 @@ Irradiance irradiance_of(const EstimationScene& world, const Mesh& mesh, const R
             options.ior = object.ior.value;
             options.sigma_a_per_m = object.sigma_a_per_m.value;
             options.is_shell = object.is_hollow;
-            options.wall_m = object.wall_m;
+            options.wall_m = object.wall_m.value;
             options.photon_count = kPhotons;
             const std::vector<Rgb> caustic =
                 caustic_irradiance(world, k, trial, points, opaque & ~object_mask(k), options);
@@ -229,26 +230,6 @@ Mesh with_albedo(const EstimationScene& world, const Scene& scene, const Mesh& r
     return mesh;
 }
 
-/// Outer surface and an inner one `wall_m` further in, facing the cavity: a thin-walled vessel.
-Mesh shell_of(const Mesh& hull, double wall_m) {
-    Mesh shell = hull;
-    if (shell.normals.empty()) shell.normals = vertex_normals(shell);
-    const auto count = static_cast<int>(shell.vertices.size());
-    const std::size_t triangles = shell.triangles.size();
-    shell.colours.clear();
-    shell.uv.clear();
-    for (int i = 0; i < count; ++i) {
-        const Vec3f normal = shell.normals[at(i)];
-        shell.vertices.push_back(shell.vertices[at(i)] - static_cast<float>(wall_m) * normal);
-        shell.normals.push_back(-normal);
-    }
-    for (std::size_t t = 0; t < triangles; ++t) {
-        const Triangle outer = shell.triangles[t];
-        shell.triangles.emplace_back(outer[0] + count, outer[2] + count, outer[1] + count);
-    }
-    return shell;
-}
-
 /// Leaves part `p` with the first paint and appends a part for each of the others.
 void split_paints(Scene& scene, std::size_t p, const ObjectEstimate& object) {
     Mesh mesh = *scene.parts[p].mesh;
@@ -300,8 +281,8 @@ Scene apply(const Scene& scene, const SceneEstimate& estimate, const Progress& p
             c = object.class_margin > 0.0 ? ObjectClass::Transparent : ObjectClass::Specular;
         if (c == ObjectClass::Transparent) {
             part.material = Dielectric{object.ior.value, object.sigma_a_per_m.value};
-            if (object.is_hollow && object.wall_m > 0.0)
-                part.mesh = std::make_shared<const Mesh>(shell_of(*part.mesh, object.wall_m));
+            if (object.is_hollow && object.wall_m.value > 0.0)
+                part.mesh = std::make_shared<const Mesh>(shell_of(*part.mesh, object.wall_m.value));
         } else if (c == ObjectClass::Specular && !object.clusters.empty()) {
             part.material = object.clusters.front().fit.ward;
             if (object.clusters.size() > 1) split_paints(result, p, object);

@@ -107,7 +107,7 @@ Json object_json(const ObjectEstimate& object) {
     if (object.object_class == ObjectClass::Transparent || is_unsure) {
         j["ior"] = estimate_json(object.ior);
         j["sigma_a_per_m"] = estimate_json(object.sigma_a_per_m);
-        if (object.is_hollow) j["wall_m"] = object.wall_m;
+        if (object.is_hollow) j["wall_m"] = estimate_json(object.wall_m);
     }
     if (object.object_class == ObjectClass::Specular || is_unsure) {
         j["clusters"] = Json::array();
@@ -136,7 +136,7 @@ ObjectEstimate read_object(const JsonObject& j) {
     if (j.has("ior")) object.ior = read_quantity<double>(j.object("ior"));
     if (j.has("sigma_a_per_m"))
         object.sigma_a_per_m = read_quantity<Rgb>(j.object("sigma_a_per_m"));
-    object.wall_m = j.number_or("wall_m", 0.0);
+    if (j.has("wall_m")) object.wall_m = read_quantity<double>(j.object("wall_m"));
     if (j.has("clusters"))
         for (const JsonObject& cluster : j.objects("clusters"))
             object.clusters.push_back(read_cluster(cluster));
@@ -144,25 +144,41 @@ ObjectEstimate read_object(const JsonObject& j) {
     return object;
 }
 
-Json light_json(const FittedLight& fitted) {
-    Json j = to_json(Light(fitted.light));
+/// A light whose distance the pictures do not tell is written as a directional one.
+Json light_json(const FittedLight& fitted, const LightEstimate& estimate) {
+    Json j = fitted.is_distant ? to_json(as_directional(fitted, estimate.reference_point_m))
+                               : to_json(Light(fitted.light));
     j["stddev_direction_deg"] = fitted.stddev_direction_deg;
     j["stddev_distance_m"] = fitted.stddev_distance_m;
+    j["stddev_radius_m"] = fitted.stddev_radius_m;
+    j["stddev_intensity_ratio"] = fitted.stddev_intensity_ratio;
     j["is_distant"] = fitted.is_distant;
+    if (fitted.is_distant)
+        j["angular_radius_rad"] =
+            fitted.light.radius_m / (fitted.light.position_m - estimate.reference_point_m).norm();
     j["outcome"] = outcome_name(fitted.outcome);
     if (!fitted.reason.empty()) j["reason"] = fitted.reason;
     return j;
 }
 
-FittedLight read_fitted_light(const JsonObject& j) {
+FittedLight read_fitted_light(const JsonObject& j, const LightEstimate& estimate) {
     FittedLight fitted;
-    j.choice("kind", {"disc"});
-    fitted.light.position_m = read_vec3(j, "position_m");
-    fitted.light.normal = read_vec3(j, "normal").normalized();
-    fitted.light.radius_m = j.number("radius_m");
-    fitted.light.intensity_w_per_sr = read_rgb(j, "intensity_w_per_sr");
+    if (j.choice("kind", {"disc", "directional"}) == "disc") {
+        fitted.light.position_m = read_vec3(j, "position_m");
+        fitted.light.normal = read_vec3(j, "normal").normalized();
+        fitted.light.radius_m = j.number("radius_m");
+        fitted.light.intensity_w_per_sr = read_rgb(j, "intensity_w_per_sr");
+    } else {
+        const double d = kDistantPerRadius * estimate.scene_radius_m;
+        const Vec3 direction = read_vec3(j, "direction").normalized();
+        fitted.light = {estimate.reference_point_m - d * direction, direction,
+                        j.number("angular_radius_rad") * d,
+                        read_rgb(j, "irradiance_w_per_m2") * static_cast<float>(d * d)};
+    }
     fitted.stddev_direction_deg = j.number_or("stddev_direction_deg", 0.0);
     fitted.stddev_distance_m = j.number_or("stddev_distance_m", 0.0);
+    fitted.stddev_radius_m = j.number_or("stddev_radius_m", 0.0);
+    fitted.stddev_intensity_ratio = j.number_or("stddev_intensity_ratio", 0.0);
     fitted.is_distant = j.boolean_or("is_distant", false);
     fitted.outcome = j.has("outcome") ? outcome_from_name(j.choice("outcome", kOutcomeWords))
                                       : Outcome::Converged;
@@ -183,7 +199,7 @@ void write_estimate(const std::filesystem::path& path, const SceneEstimate& esti
                           {"offset_m", light.plane.offset}};
     j["scene_radius_m"] = light.scene_radius_m;
     j["lights"] = Json::array();
-    for (const FittedLight& fitted : light.lights) j["lights"].push_back(light_json(fitted));
+    for (const FittedLight& fitted : light.lights) j["lights"].push_back(light_json(fitted, light));
     j["lights_outcome"] = outcome_name(light.outcome);
     if (!light.reason.empty()) j["lights_reason"] = light.reason;
     j["grid_direction"] = to_json(light.grid_direction);
@@ -211,7 +227,8 @@ SceneEstimate read_estimate(const std::filesystem::path& path) {
         light.plane.offset = plane.number("offset_m");
     }
     light.scene_radius_m = j.number_or("scene_radius_m", 0.5);
-    for (const JsonObject& l : j.objects("lights")) light.lights.push_back(read_fitted_light(l));
+    for (const JsonObject& l : j.objects("lights"))
+        light.lights.push_back(read_fitted_light(l, light));
     light.outcome = j.has("lights_outcome")
                         ? outcome_from_name(j.choice("lights_outcome", kOutcomeWords))
                         : Outcome::Converged;

@@ -6,8 +6,7 @@ namespace vitrine {
 
 namespace {
 
-constexpr double kPointRadius = 1e-3;       // metres (or of the distance): a point's disc
-constexpr double kDistantPerRadius = 30.0;  // radii of the scene: as parallel as the sun's rays
+constexpr double kPointRadius = 1e-3;  // metres (or of the distance): a point's disc
 
 FittedLight as_given(const Light& light, const Vec3& reference, double scene_radius_m) {
     FittedLight fitted;

@@ -1,5 +1,6 @@
 #include "estimate/light_search.h"
 
+#include "estimate/lights.h"
 #include "math/optimise.h"
 #include "math/sampling.h"
 
@@ -19,6 +20,7 @@ constexpr double kMinElevationSine = 0.05;  // lower lights graze the table and 
 constexpr double kFirstRadiusPerMetre = 0.04;
 constexpr double kMinDistancePerRadius = 0.8, kMaxDistancePerRadius = 12.0;
 constexpr double kPenalty = 10.0;
+constexpr double kBoundMargin = 1.05;  // this near its end of the range, a light lies at it
 
 Vec3 tilted(const Vec3& direction, double x, double y) {
     const Frame frame(direction.cast<float>());
@@ -48,7 +50,7 @@ HemisphereGrid make_hemisphere(const ScanSamples& samples, int count) {
         grid.directions.push_back(frame.to_world(local).cast<double>().normalized());
     }
     const double diameter = 2.0 * samples.scene_radius_m;
-    grid.distances_m = {diameter, 1.8 * diameter};
+    grid.distances_m = {diameter, 1.8 * diameter, kDistantPerRadius * samples.scene_radius_m};
     return grid;
 }
 
@@ -127,7 +129,8 @@ LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineO
     for (std::size_t k = 0; k < start.lights.size(); ++k) {
         x0.insert(x0.end(), kPerLight, 0.0);
         const double step = options.keep_geometry ? 0.0 : options.step_rad;
-        steps.insert(steps.end(), {step, step, 1.5 * step, options.refine_radius ? 4.0 * step : 0.0,
+        const double to_or_fro = options.keep_distances ? 0.0 : 1.5 * step;
+        steps.insert(steps.end(), {step, step, to_or_fro, options.refine_radius ? 4.0 * step : 0.0,
                                    k == 0 ? 0.0 : std::max(0.2, 2.0 * step)});
     }
     const auto unpack = [&](const std::vector<double>& x) {
@@ -148,8 +151,9 @@ LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineO
         const std::vector<PolarLight> lights = unpack(x);
         double penalty = 0.0;
         for (const PolarLight& light : lights) {
+            if (options.keep_geometry) break;  // wherever they stand
             if (light.distance_m < kMinDistancePerRadius * radius ||
-                light.distance_m > kMaxDistancePerRadius * radius ||
+                (!options.keep_distances && light.distance_m > kMaxDistancePerRadius * radius) ||
                 light.direction.dot(up) < kMinElevationSine ||
                 light.radius_m > 0.35 * light.distance_m || light.radius_m < 1e-4)
                 penalty += kPenalty;
@@ -170,16 +174,64 @@ LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineO
     return result;
 }
 
+bool has_distant(const LightFit& fit, const LightSet& set) {
+    return std::any_of(set.lights.begin(), set.lights.end(), [&](const PolarLight& light) {
+        return light.distance_m > kMaxDistancePerRadius * fit.samples().scene_radius_m;
+    });
+}
+
+LightSet at_distance(const LightFit& fit, const LightSet& set, std::size_t k, double per_radius) {
+    LightSet start = set;
+    PolarLight& light = start.lights[k];
+    const double scale = per_radius * fit.samples().scene_radius_m / light.distance_m;
+    light.distance_m *= scale;
+    light.radius_m *= scale;  // the same penumbrae
+    if (k > 0) {
+        light.weight *= scale * scale;
+    } else {
+        for (std::size_t i = 1; i < start.lights.size(); ++i)
+            start.lights[i].weight /= scale * scale;
+    }
+    const bool is_far = has_distant(fit, start);
+    return refine_lights(fit, start,
+                         {.max_evaluations = is_far ? 60 : 140,
+                          .step_rad = is_far ? 0.02 : 0.06,
+                          .keep_distances = is_far});
+}
+
+double evidence_of_distance(const LightFit& fit, const LightSet& near, const LightSet& distant) {
+    constexpr int kDiscSamples = 16;
+    std::vector<double> near_loss, distant_loss, weight;
+    fit.losses(columns_of(fit, near.lights, kDiscSamples, 1), 1, kLuminance, near.score, near_loss,
+               weight);
+    fit.losses(columns_of(fit, distant.lights, kDiscSamples, 1), 1, kLuminance, distant.score,
+               distant_loss, weight);
+    std::map<int, double> block_sum;
+    for (std::size_t i = 0; i < weight.size(); ++i)
+        block_sum[fit.samples().block[i]] += weight[i] * (distant_loss[i] - near_loss[i]);
+    double sum = 0.0, square = 0.0;
+    for (const auto& [block, value] : block_sum) {
+        sum += value;
+        square += value * value;
+    }
+    return square > 0.0 ? sum / std::sqrt(square) : 0.0;
+}
+
 LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k) {
-    // Steps wide enough to cross several samples at every shadow border.
-    constexpr std::array<double, 3> kStep = {0.02, 0.02, 0.08};
+    // Two angles, log distance, log radius: steps wide enough to cross several samples at every
+    // shadow border.
+    constexpr int kCount = 4;
+    using Vector = Eigen::Matrix<double, kCount, 1>;
+    using Matrix = Eigen::Matrix<double, kCount, kCount>;
+    const Vector steps(0.02, 0.02, 0.08, 0.3);
     constexpr int kDiscSamples = 16;
     std::vector<double> weight;
-    const auto evaluate = [&](const Vec3& x, std::vector<double>& loss) {
+    const auto evaluate = [&](const Vector& x, std::vector<double>& loss) {
         std::vector<PolarLight> lights = set.lights;
         lights[k].direction = tilted(lights[k].direction, x[0], x[1]);
         lights[k].weight *= std::exp(2.0 * x[2]);
         lights[k].distance_m *= std::exp(x[2]);
+        lights[k].radius_m *= std::exp(x[2] + x[3]);
         const LightColumns columns = columns_of(fit, lights, kDiscSamples, 1);
         const LightScore score = fit.score_at(columns, 1, kLuminance, set.score.ambient_ratio);
         fit.losses(columns, 1, kLuminance, score, loss, weight);
@@ -192,55 +244,53 @@ LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::si
         return sum / total;
     };
     std::vector<double> plus, minus, unused;
-    const double centre = evaluate(Vec3::Zero(), unused);
+    const double centre = evaluate(Vector::Zero(), unused);
     double total_weight = 0.0;
     for (const double w : weight) total_weight += w;
 
-    Mat3 hessian = Mat3::Zero();
-    std::map<int, Vec3> block_sum;
-    std::array<double, 3> up{}, down{};
-    for (int a = 0; a < 3; ++a) {
-        Vec3 step = Vec3::Zero();
-        step[a] = kStep[static_cast<std::size_t>(a)];
-        up[static_cast<std::size_t>(a)] = evaluate(step, plus);
-        down[static_cast<std::size_t>(a)] = evaluate(-step, minus);
-        hessian(a, a) =
-            (up[static_cast<std::size_t>(a)] + down[static_cast<std::size_t>(a)] - 2.0 * centre) /
-            (step[a] * step[a]);
+    Matrix hessian = Matrix::Zero();
+    std::map<int, Vector> block_sum;
+    Vector up, down;
+    for (int a = 0; a < kCount; ++a) {
+        const Vector step = steps[a] * Vector::Unit(a);
+        up[a] = evaluate(step, plus);
+        down[a] = evaluate(-step, minus);
+        hessian(a, a) = (up[a] + down[a] - 2.0 * centre) / (steps[a] * steps[a]);
         for (std::size_t i = 0; i < plus.size(); ++i) {
-            auto [entry, is_new] = block_sum.try_emplace(fit.samples().block[i], Vec3::Zero());
-            entry->second[a] += (plus[i] - minus[i]) / (2.0 * step[a]);
+            auto [entry, is_new] = block_sum.try_emplace(fit.samples().block[i], Vector::Zero());
+            entry->second[a] += (plus[i] - minus[i]) / (2.0 * steps[a]);
         }
     }
-    for (int a = 0; a < 3; ++a) {
-        for (int b = a + 1; b < 3; ++b) {
-            Vec3 step = Vec3::Zero();
-            step[a] = kStep[static_cast<std::size_t>(a)];
-            step[b] = kStep[static_cast<std::size_t>(b)];
+    for (int a = 0; a < kCount; ++a) {
+        for (int b = a + 1; b < kCount; ++b) {
+            const Vector step = steps[a] * Vector::Unit(a) + steps[b] * Vector::Unit(b);
             const double both = evaluate(step, plus);
-            hessian(a, b) = hessian(b, a) = (both - up[static_cast<std::size_t>(a)] -
-                                             up[static_cast<std::size_t>(b)] + centre) /
-                                            (step[a] * step[b]);
+            hessian(a, b) = hessian(b, a) = (both - up[a] - up[b] + centre) / (steps[a] * steps[b]);
         }
     }
     LightDeviation deviation;
+    const PolarLight& light = set.lights[k];
+    deviation.is_at_bound =
+        light.distance_m < kBoundMargin * kMinDistancePerRadius * fit.samples().scene_radius_m ||
+        light.direction.dot(fit.samples().plane.normal) < kBoundMargin * kMinElevationSine;
     deviation.is_identifiable = hessian(0, 0) > 0.0 && hessian(1, 1) > 0.0;
-    Mat3 meat = Mat3::Zero();
+    Matrix meat = Matrix::Zero();
     for (const auto& [block, sum] : block_sum) {
-        const Vec3 s = sum / total_weight;
+        const Vector s = sum / total_weight;
         meat += s * s.transpose();
     }
     // Directions in which the cost does not curve upward carry no information.
-    const Eigen::SelfAdjointEigenSolver<Mat3> solver(hessian);
-    Mat3 inverse = Mat3::Zero();
-    for (int a = 0; a < 3; ++a) {
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(hessian);
+    Matrix inverse = Matrix::Zero();
+    for (int a = 0; a < kCount; ++a) {
         const double curvature = std::max(solver.eigenvalues()[a], 1e-3);
-        const Vec3 v = solver.eigenvectors().col(a);
+        const Vector v = solver.eigenvectors().col(a);
         inverse += v * v.transpose() / curvature;
     }
-    const Mat3 covariance = inverse * meat * inverse;
+    const Matrix covariance = inverse * meat * inverse;
     deviation.direction_rad = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
     deviation.log_distance = std::sqrt(std::max(0.0, covariance(2, 2)));
+    deviation.log_radius = std::sqrt(std::max(0.0, covariance(3, 3)));
     return deviation;
 }
 

@@ -41,6 +41,15 @@ std::vector<LightSet> search_single(const LightFit& fit, const HemisphereGrid& g
 std::vector<LightSet> search_pairs(const LightFit& fit, const HemisphereGrid& grid,
                                    std::span<const LightSet> firsts, int stride);
 
+/// Whether one stands beyond where distances are told apart.
+bool has_distant(const LightFit& fit, const LightSet& set);
+/// The set refined with light `k` first put at a distance, in radii of the scene, with the same
+/// penumbrae; a distant light stays as far.
+LightSet at_distance(const LightFit& fit, const LightSet& set, std::size_t k, double per_radius);
+/// How clearly the nearer light `k` explains the scan better than the same light far away: the
+/// difference of the losses over its deviation, from sums over blocks. Below 2: not at all.
+double evidence_of_distance(const LightFit& fit, const LightSet& near, const LightSet& distant);
+
 struct RefineOptions {
     int stride = 1;
     int disc_samples = 16;
@@ -48,6 +57,7 @@ struct RefineOptions {
     double step_rad = 0.1;  ///< first simplex
     bool refine_radius = true;
     bool keep_geometry = false;  ///< only weights
+    bool keep_distances = false;
 };
 /// Simplex search over direction, log distance, log radius and weight of all lights together.
 LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineOptions& options);
@@ -55,6 +65,8 @@ LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineO
 struct LightDeviation {
     double direction_rad = 0.0;  ///< root of the mean variance of the two angles
     double log_distance = 0.0;
+    double log_radius = 0.0;
+    bool is_at_bound = false;      ///< as near or as low as lights are looked for
     bool is_identifiable = false;  ///< the cost curves upward in both angles
 };
 /// Standard deviations of light `k` from block sums of the loss (sandwich estimator, the limit of

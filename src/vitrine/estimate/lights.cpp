@@ -3,6 +3,7 @@
 #include "base/log.h"
 #include "estimate/known_lights.h"
 #include "estimate/light_data.h"
+#include "estimate/light_outcome.h"
 #include "estimate/light_search.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
@@ -19,11 +20,17 @@ constexpr std::size_t kStarts = 4;  // grid lights that are refined
 // A second light must explain this share of what one leaves (by evidence, see docs/estimation.md).
 constexpr double kSecondLightGain = 0.18;
 constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are texture
+constexpr int kRestarts = 3;
+constexpr double kSettled = 0.995;            // a restart that gains less is the last
+constexpr double kNearPerRadius = 3.0;        // radii of the scene: a lamp over a table
+constexpr double kMinDistanceEvidence = 2.0;  // deviations; less, and it may be the sun
 constexpr double kMinSeparationRad = 0.436;
-// Block sums see noise and texture, not the model's own error (bounced light of 96 rays, disc of
-// uniform emission, a mesh 1 mm off): the share found by comparing with known lights.
-constexpr double kModelDeviationRad = 0.009;
-constexpr double kModelLogDistance = 0.02;
+
+/// A distant light stays distant while it is refined.
+RefineOptions with_distances_of(const LightFit& fit, const LightSet& set, RefineOptions options) {
+    options.keep_distances = has_distant(fit, set);
+    return options;
+}
 
 LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEstimate& estimate,
                      const Progress& progress) {
@@ -40,13 +47,15 @@ LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEsti
                               .refine_radius = false};
     std::vector<LightSet> refined;
     for (std::size_t i = 0; i < std::min(kStarts, singles.size()); ++i)
-        refined.push_back(refine_lights(fit, singles[i], scout));
+        refined.push_back(
+            refine_lights(fit, singles[i], with_distances_of(fit, singles[i], scout)));
     std::stable_sort(refined.begin(), refined.end(), [](const LightSet& a, const LightSet& b) {
         return a.score.cost < b.score.cost;
     });
     const RefineOptions fine{
         .stride = 1, .disc_samples = 16, .max_evaluations = 140, .step_rad = 0.04};
-    LightSet best = refine_lights(fit, refined.front(), fine);
+    LightSet best =
+        refine_lights(fit, refined.front(), with_distances_of(fit, refined.front(), fine));
     progress.update(0.6, "looking for a second light");
 
     for (int count = 2; count <= options.max_lights; ++count) {
@@ -60,7 +69,8 @@ LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEsti
         LightSet best_pair;
         best_pair.score.cost = 2.0;
         for (std::size_t i = 0; i < std::min<std::size_t>(3, pairs.size()); ++i) {
-            LightSet pair = refine_lights(fit, pairs[i], pair_scout);
+            LightSet pair =
+                refine_lights(fit, pairs[i], with_distances_of(fit, pairs[i], pair_scout));
             if (pair.score.cost < best_pair.score.cost) best_pair = pair;
         }
         if (best_pair.lights.empty()) break;
@@ -71,7 +81,15 @@ LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEsti
         if (best_pair.score.cost > (1.0 - kSecondLightGain) * one.cost) break;
         RefineOptions pair_fine = fine;
         pair_fine.max_evaluations = 260;
+        pair_fine = with_distances_of(fit, best_pair, pair_fine);
         best_pair = refine_lights(fit, best_pair, pair_fine);
+        // Ten unknowns: one simplex stalls, a fresh one goes on.
+        for (int again = 0; again < kRestarts; ++again) {
+            const LightSet next = refine_lights(fit, best_pair, pair_fine);
+            const bool has_settled = next.score.cost > kSettled * best_pair.score.cost;
+            if (next.score.cost < best_pair.score.cost) best_pair = next;
+            if (has_settled) break;
+        }
         double total = 0.0, least = 1e30;
         for (const PolarLight& light : best_pair.lights) {
             const double e = light.weight / (light.distance_m * light.distance_m);
@@ -122,6 +140,19 @@ void fit_channels(const LightFit& fit, const LightSet& set, LightEstimate& estim
     }
 }
 
+/// Compares light `k` near and far; true when the pictures show how near it is.
+bool keep_nearer_if_evident(const LightFit& fit, LightSet& set, std::size_t k) {
+    const double far_m = 0.9 * kDistantPerRadius * fit.samples().scene_radius_m;
+    const bool starts_far = set.lights[k].distance_m > far_m;
+    const LightSet other =
+        at_distance(fit, set, k, starts_far ? kNearPerRadius : kDistantPerRadius);
+    const LightSet& near = starts_far ? other : set;
+    const LightSet& far = starts_far ? set : other;
+    const bool is_near = evidence_of_distance(fit, near, far) >= kMinDistanceEvidence;
+    if (is_near == starts_far) set = other;
+    return is_near;
+}
+
 LightSet from_lights(const std::vector<DiscLight>& lights, const Vec3& reference) {
     LightSet set;
     for (const DiscLight& light : lights) {
@@ -154,42 +185,38 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
 
     LightSet set;
     if (options.start && !options.start->empty()) {
+        const LightSet start = from_lights(*options.start, samples.reference_point);
         const RefineOptions refine =
             options.keep_start ? RefineOptions{.max_evaluations = 60, .keep_geometry = true}
-                               : RefineOptions{.max_evaluations = 160, .step_rad = 0.03};
-        set = refine_lights(fit, from_lights(*options.start, samples.reference_point), refine);
+                               : RefineOptions{.max_evaluations = 160,
+                                               .step_rad = 0.03,
+                                               .keep_distances = has_distant(fit, start)};
+        set = refine_lights(fit, start, refine);
     } else {
         set = find_lights(fit, options, estimate, progress);
     }
+    progress.update(0.75, "near or distant");
+    std::vector<char> is_distant(set.lights.size(), 0);
+    for (std::size_t k = 0; k < set.lights.size(); ++k)
+        is_distant[k] = options.keep_start ? has_distant(fit, {{set.lights[k]}, {}})
+                                           : !keep_nearer_if_evident(fit, set, k);
     progress.update(0.85, "strength and doubt of the lights");
 
     estimate.error_refined = set.score.cost;
     estimate.residual_rms = set.score.residual_rms;
     estimate.outcome = Outcome::Converged;
     for (std::size_t k = 0; k < set.lights.size(); ++k) {
-        const PolarLight& polar = set.lights[k];
-        FittedLight fitted;
-        const TrialLight trial = to_trial(polar, samples.reference_point);
-        fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
-        const LightDeviation deviation = light_deviation(fit, set, k);
-        fitted.stddev_direction_deg =
-            degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, kModelDeviationRad));
-        fitted.stddev_distance_m =
-            polar.distance_m * std::hypot(deviation.log_distance, kModelLogDistance);
-        fitted.outcome = Outcome::Converged;
-        if (!deviation.is_identifiable || fitted.stddev_direction_deg > 15.0) {
-            fitted.outcome = Outcome::NotIdentifiable;
-            fitted.reason = "no shadow or second surface tells where this light stands";
-        }
-        fitted.is_distant =
-            deviation.log_distance > 0.35 || polar.distance_m > 10.0 * samples.scene_radius_m;
-        if (fitted.outcome != Outcome::Converged) {
-            estimate.outcome = fitted.outcome;
-            estimate.reason = fitted.reason;
-        }
-        estimate.lights.push_back(fitted);
+        estimate.lights.push_back(with_deviations(fit, set, k, is_distant[k] != 0));
+        const FittedLight& fitted = estimate.lights.back();
+        if (fitted.outcome == Outcome::Converged) continue;
+        estimate.outcome = fitted.outcome;
+        estimate.reason = fitted.reason;
     }
     fit_channels(fit, set, estimate);
+    if (frames.size() < 2) {
+        estimate.outcome = Outcome::NotIdentifiable;
+        estimate.reason = "only one view: no second picture checks geometry and light";
+    }
     progress.update(1.0);
     return estimate;
 }
@@ -199,14 +226,16 @@ double elevation_deg(const LightEstimate& estimate, const Vec3& light_position_m
     return degrees(std::asin(std::clamp(d.dot(estimate.plane.normal), -1.0, 1.0)));
 }
 
+DirectionalLight as_directional(const FittedLight& light, const Vec3& reference_point_m) {
+    const Vec3 d = reference_point_m - light.light.position_m;
+    return {d.normalized(), light.light.intensity_w_per_sr / static_cast<float>(d.squaredNorm())};
+}
+
 std::vector<Light> to_lights(const LightEstimate& estimate) {
     std::vector<Light> lights;
     for (const FittedLight& fitted : estimate.lights) {
         if (fitted.is_distant) {
-            const Vec3 d = estimate.reference_point_m - fitted.light.position_m;
-            lights.push_back(DirectionalLight{
-                d.normalized(),
-                fitted.light.intensity_w_per_sr / static_cast<float>(d.squaredNorm())});
+            lights.push_back(as_directional(fitted, estimate.reference_point_m));
         } else {
             lights.push_back(fitted.light);
         }

@@ -31,6 +31,8 @@ struct FittedLight {
     DiscLight light;  ///< aimed at the reference point
     double stddev_direction_deg = 0.0;
     double stddev_distance_m = 0.0;
+    double stddev_radius_m = 0.0;
+    double stddev_intensity_ratio = 0.0;         ///< of the intensity, relative
     Outcome outcome = Outcome::NotIdentifiable;  ///< of the direction
     std::string reason;
     bool is_distant = false;  ///< its distance is not identifiable: only the direction counts
@@ -65,6 +67,11 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
 
 /// Elevation of a light above the support plane seen from the reference point, degrees.
 double elevation_deg(const LightEstimate& estimate, const Vec3& light_position_m);
+
+/// Distance from which a lamp lights the scene as the sun does, in radii of the scene.
+constexpr double kDistantPerRadius = 30.0;
+/// A distant light by what it is: a direction and an irradiance.
+DirectionalLight as_directional(const FittedLight& light, const Vec3& reference_point_m);
 
 /// The estimate's lights as the renderer takes them.
 std::vector<Light> to_lights(const LightEstimate& estimate);

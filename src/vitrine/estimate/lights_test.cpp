@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace vitrine {
 namespace {
 
@@ -148,6 +150,19 @@ TEST(EstimateLights, KnownLightsAreTakenAsTheyAre) {
 
     options.known_lights = {SpotLight{}};
     EXPECT_THROW(estimate_lights(world.scene, world.frames, 1e9, options), InputError);
+}
+
+TEST(EstimateLights, ALampInsideTheSceneLiesAtTheBound) {
+    // As a lamp inside of a glass body does: nearer than lights are looked for.
+    const World world = make_world({aimed(Vec3(0.02, 0.01, 0.14), 0.01, 0.3f)}, 0.0f);
+    LightOptions options = small_options();
+    options.max_lights = 1;
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, options);
+    EXPECT_NE(e.outcome, Outcome::Converged);
+    EXPECT_FALSE(e.reason.empty());
+    for (const FittedLight& fitted : e.lights)
+        EXPECT_TRUE(fitted.light.position_m.allFinite() &&
+                    std::isfinite(fitted.stddev_direction_deg));
 }
 
 TEST(EstimateLights, SaysWhenEverythingIsClipped) {

@@ -1,6 +1,7 @@
 #include "estimate/materials.h"
 
 #include "base/log.h"
+#include "estimate/caustic_cue.h"
 #include "estimate/object_context.h"
 
 #include <algorithm>
@@ -12,9 +13,18 @@ namespace {
 
 // A lobe must improve a diffuse fit by this much (in the logarithm) to be believed.
 constexpr double kLobeGain = 0.15;
+// A clear coat of index 1.5 reflects 4 %: a lobe no stronger is gloss on paint or plastic.
+constexpr double kCoatReflectance = 0.06;
 constexpr int kMinPixels = 60;
 
 double log_ratio(double a, double b) { return std::log(std::max(a, 1e-4) / std::max(b, 1e-4)); }
+
+double strongest_lobe(const std::vector<WardCluster>& clusters) {
+    double strongest = 0.0;
+    for (const WardCluster& cluster : clusters)
+        strongest = std::max(strongest, double{luminance(cluster.fit.ward.rho_s)});
+    return strongest;
+}
 
 /// Class by cost; fills margin and reason.
 ObjectClass classify(ObjectEstimate& object, double unsure_margin) {
@@ -26,7 +36,49 @@ ObjectClass classify(ObjectEstimate& object, double unsure_margin) {
     }
     if (object.class_margin > 0.0) return ObjectClass::Transparent;
     if (log_ratio(object.cost_diffuse, object.cost_ward) < kLobeGain) return ObjectClass::Diffuse;
+    if (strongest_lobe(object.clusters) < kCoatReflectance) {
+        object.reason = "its gloss is as faint as that of plastic or paint";
+        return ObjectClass::Diffuse;
+    }
     return ObjectClass::Specular;
+}
+
+/// The index of solid glass with its caustic as a second cue.
+Estimate<double> with_caustic(const EstimationScene& world, const FrameLookup& lookup, int object,
+                              const LightEstimate& lights, const TransparentFit& solid,
+                              const TransparentOptions& options) {
+    constexpr int kTrials = 21;
+    std::vector<double> iors;
+    for (int k = 0; k < kTrials; ++k)
+        iors.push_back(options.ior_min + (options.ior_max - options.ior_min) * k / (kTrials - 1.0));
+    CausticScene light;
+    for (const FittedLight& fitted : lights.lights) light.lights.push_back(fitted.light);
+    light.ambient = lights.ambient_radiance;
+    light.sigma_a_per_m = solid.sigma_a_per_m.value;
+    light.plane = lights.plane;
+    const CausticCue cue = caustic_cue(world, lookup, object, light, iors);
+    const Estimate<double> index = combined_index(solid.ior, iors, cue);
+    log_debug("caustic: {} places, spread {:.3f}, index {:.4f} -> {:.4f}", cue.receiver_count,
+              cue.stddev, solid.ior.value, index.value);
+    return index;
+}
+
+bool has_two_views(const std::vector<ObjectPixel>& pixels) {
+    return std::any_of(pixels.begin(), pixels.end(), [&](const ObjectPixel& pixel) {
+        return pixel.frame != pixels.front().frame;
+    });
+}
+
+/// One view: what lies behind glass and where a highlight moves would both be guesses.
+void doubt_all(ObjectEstimate& object, const ObjectOverride* known) {
+    const auto doubt = [](auto& quantity) {
+        quantity.outcome = Outcome::NotIdentifiable;
+        quantity.reason = "only one view shows this object: no second picture checks it";
+    };
+    if (!known || !known->ior) doubt(object.ior);
+    if (!known || !known->sigma_a_per_m) doubt(object.sigma_a_per_m);
+    doubt(object.wall_m);
+    for (WardCluster& cluster : object.clusters) doubt(cluster.fit.sigma);
 }
 
 }  // namespace
@@ -78,6 +130,7 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         object.cost_shell = shell.cost;
         object.cost_ward = metal.cost;
         object.cost_diffuse = metal.cost_diffuse;
+        object.clusters = metal.clusters;
         object.class_margin = 0.0;
         object.object_class = classify(object, options.unsure_margin);
         log_debug(
@@ -85,17 +138,27 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
             "ward {:.4f} (sigma {:.3f}, lobe {:.2f}) diffuse {:.4f}",
             object.id, pixels.size(), solid.cost, solid.ior.value, solid.explained, shell.cost,
             shell.explained, ward.cost, ward.sigma.value, ward.lobe_share, ward.cost_diffuse);
-        if (override && override->ignore) object.object_class = ObjectClass::Diffuse;
-        if (override && override->object_class) object.object_class = *override->object_class;
+        if (override && override->ignore) {
+            object.object_class = ObjectClass::Diffuse;
+            object.reason = "given: not an object";
+        }
+        if (override && override->object_class) {
+            object.object_class = *override->object_class;
+            object.reason = "class given";
+        }
 
         const TransparentFit& clear = shell.cost < solid.cost ? shell : solid;
         object.ior = clear.ior;
+        const bool is_free =
+            !transparent.known_ior && transparent.ior_step == 0.0 && transparent.ior_grid.empty();
+        if (object.object_class == ObjectClass::Transparent && !clear.is_shell && is_free)
+            object.ior = with_caustic(world, lookup, k, lights, clear, transparent);
         object.sigma_a_per_m = clear.sigma_a_per_m;
         object.is_hollow = clear.is_shell;
         object.wall_m = clear.wall_m;
-        object.clusters = metal.clusters;
         object.paints = metal.paints;
         object.albedo = ward.albedo;
+        if (!has_two_views(pixels)) doubt_all(object, override);
         objects.push_back(object);
     }
     progress.update(1.0);
@@ -123,6 +186,7 @@ void refit_specular(const Scene& scene, std::span<const RgbdFrame> frames, doubl
         object.albedo = ward.albedo;
         object.clusters = metal.clusters;
         object.paints = metal.paints;
+        if (!has_two_views(pixels)) doubt_all(object, nullptr);
     }
 }
 

@@ -38,10 +38,11 @@ struct ObjectEstimate {
     ObjectClass object_class = ObjectClass::Unsure;
     double class_margin = 0.0;  ///< ln(cost as metal / cost as glass); > 0: transparent
     bool is_hollow = false;
-    double wall_m = 0.0;  ///< of a hollow one
+    Estimate<double> wall_m;  ///< of a hollow one
     std::string mesh_file;
-    Estimate<double> ior;               ///< transparent only
-    Estimate<Rgb> sigma_a_per_m;        ///< transparent only
+    Estimate<double> ior;  ///< transparent only
+    /// Transparent only.
+    Estimate<Rgb> sigma_a_per_m{Rgb::Zero(), Rgb::Zero(), 0.0, Outcome::NotIdentifiable, {}};
     std::vector<WardCluster> clusters;  ///< specular only
     AlbedoClusters paints;              ///< where each cluster lies; not in estimate.json
     Rgb albedo = Rgb::Constant(0.5f);   ///< best single albedo: what a diffuse world makes of it

@@ -126,6 +126,14 @@ void SpecularModel::set_lamps(const std::vector<DiscLight>& lamps) {
     }
 }
 
+double SpecularModel::lit_share() const {
+    std::size_t lit = 0;
+    for (std::size_t i = 0; i < pixels_.size(); ++i)
+        lit += std::any_of(visibility_.begin(), visibility_.end(),
+                           [&](const std::vector<float>& visible) { return visible[i] > 0.5f; });
+    return pixels_.empty() ? 0.0 : static_cast<double>(lit) / static_cast<double>(pixels_.size());
+}
+
 std::vector<Rgb> SpecularModel::surroundings(const WardLobe& lobe) const {
     std::vector<Rgb> result(pixels_.size());
     parallel_for(pixels_.size(), 32, [&](std::size_t i) {

@@ -79,6 +79,8 @@ class SpecularModel {
     /// @param weight of each pixel and channel
     WardProblem problem(const WardLobe& lobe, const std::vector<Rgbd>& weight) const;
 
+    /// Share of the pixels that some lamp reaches.
+    double lit_share() const;
     const std::vector<ObjectPixel>& pixels() const { return pixels_; }
     const std::vector<Rgb>& irradiance() const { return irradiance_; }
 

@@ -2,6 +2,8 @@
 
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "estimate/model_error.h"
+#include "estimate/vessel.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
 #include "optics/fresnel.h"
@@ -17,14 +19,11 @@ namespace {
 constexpr double kCap = 0.25;  // of the bright level: beyond, a pixel is simply wrong
 constexpr int kIorGrid = 21;   // step 0.04: no basin of the objective is narrower
 constexpr int kBootstrapRounds = 40;
-constexpr float kMinLength = 0.005f;  // metres: shorter ways tell nothing of absorption
-// Resampled views share the hull's errors; the residual they leave tells how large those are.
-constexpr double kIorDoubtPerCost = 0.35;
-constexpr double kAbsorptionDoubt = 0.15;  // per metre: gain errors of 1 % over 7 cm
-// Over an even background every index predicts about the same picture.
+// Over an even background every index predicts about the same picture: the worst one must be worse
+// by this factor, and by more than gain errors of the pictures (of the bright level).
 constexpr double kMinCostContrast = 1.15;
+constexpr double kMinCostSpread = 0.02;
 constexpr double kMinExplained = 0.15;
-constexpr double kDefaultWall = 0.0025;
 
 Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& direction,
                 const Rgb& ambient) {
@@ -73,15 +72,11 @@ double pixel_cost(const ThroughPixel& t, const ObjectPixel& p, const Rgb& sigma_
     return std::min(static_cast<double>((model - p.radiance).abs().mean()) / bright, kCap);
 }
 
-/// Cost with absorption fitted, over the pixels `weight` counts (bootstrap), or all if empty.
-struct Profile {
-    Rgb sigma_a = Rgb::Zero();
-    double cost = 1.0;
-};
+}  // namespace
 
-/// Weighted median per channel; light from inside depends on the answer, so three rounds.
-Rgb absorption_of(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
-                  double bright, const std::vector<int>& count) {
+// Light from inside depends on the answer, so three rounds.
+Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
+                   double bright, double min_length_m, const std::vector<int>& count) {
     constexpr int kRounds = 3;
     Rgb sigma_a = Rgb::Zero();
     std::vector<double> value, weight;
@@ -93,7 +88,9 @@ Rgb absorption_of(const std::vector<ThroughPixel>& through, const std::vector<Ob
             double total = 0.0;
             for (std::size_t i = 0; i < pixels.size(); ++i) {
                 const ThroughPixel& t = through[i];
-                if (!t.is_valid || pixels[i].is_clipped || t.length_m < kMinLength) continue;
+                if (!t.is_valid || pixels[i].is_clipped ||
+                    static_cast<double>(t.length_m) < min_length_m)
+                    continue;
                 if (!count.empty() && count[i] == 0) continue;
                 const double r0 = t.transmitted[c];
                 if (r0 < 0.02 * bright) continue;
@@ -110,8 +107,9 @@ Rgb absorption_of(const std::vector<ThroughPixel>& through, const std::vector<Ob
     return sigma_a;
 }
 
-double cost_of(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
-               const Rgb& sigma_a, double bright, const std::vector<int>& count) {
+double through_cost(const std::vector<ThroughPixel>& through,
+                    const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright,
+                    const std::vector<int>& count) {
     double sum = 0.0, total = 0.0;
     for (std::size_t i = 0; i < pixels.size(); ++i) {
         if (!through[i].is_valid || pixels[i].is_clipped) continue;
@@ -128,7 +126,6 @@ double share_explained(const std::vector<ThroughPixel>& through) {
     return through.empty() ? 0.0 : static_cast<double>(valid) / static_cast<double>(through.size());
 }
 
-/// How often each pixel is drawn when whole views are drawn with replacement.
 std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view_count,
                                 std::uint64_t round) {
     Rng rng(stream_key(0xb007u, round));
@@ -140,8 +137,6 @@ std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view
         count[i] = drawn[static_cast<std::size_t>(pixels[i].frame)];
     return count;
 }
-
-}  // namespace
 
 std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
                                        int object, const std::vector<ObjectPixel>& pixels,
@@ -156,27 +151,17 @@ std::vector<ThroughPixel> look_through(const EstimationScene& scene, const Frame
         });
 }
 
-std::vector<ThroughPixel> look_through_shell(const EstimationScene& scene,
-                                             const FrameLookup& lookup, int object,
-                                             const std::vector<ObjectPixel>& pixels, double ior,
-                                             const Rgb& ambient) {
+std::vector<ThroughPixel> look_through_vessel(const EstimationScene& scene,
+                                              const FrameLookup& lookup, int object,
+                                              const std::vector<ObjectPixel>& pixels, double ior,
+                                              double wall_m, const Rgb& ambient) {
+    const Vessel vessel(scene.mesh(scene.part_of_object(object)), wall_m);
     return predict(
         scene, lookup, pixels, ambient,
         [&](const ObjectPixel& p) {
-            return pass_through_shell(scene, object, p.eye, p.direction, static_cast<float>(ior),
-                                      1.0f);
+            return vessel.pass(p.eye, p.direction, static_cast<float>(ior));
         },
         [](const ObjectPixel&) { return RefractedPath{}; });
-}
-
-Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
-                   double bright) {
-    return absorption_of(through, pixels, bright, {});
-}
-
-double through_cost(const std::vector<ThroughPixel>& through,
-                    const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright) {
-    return cost_of(through, pixels, sigma_a, bright, {});
 }
 
 TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup, int object,
@@ -185,8 +170,9 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     TransparentFit fit;
     const auto sigma_for = [&](const std::vector<ThroughPixel>& through,
                                const std::vector<int>& count) {
-        return options.known_sigma_a ? *options.known_sigma_a
-                                     : absorption_of(through, pixels, bright, count);
+        return options.known_sigma_a
+                   ? *options.known_sigma_a
+                   : fit_absorption(through, pixels, bright, kMinSolidLength, count);
     };
     std::vector<double> trial;
     std::vector<std::vector<ThroughPixel>> predicted;
@@ -195,7 +181,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         predicted.push_back(look_through(scene, lookup, object, pixels, ior, options.ambient));
         trial.push_back(ior);
         const double cost =
-            cost_of(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
+            through_cost(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
         greatest = std::max(greatest, cost);
         return cost;
     };
@@ -223,7 +209,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         look_through(scene, lookup, object, pixels, best_ior, options.ambient);
     fit.ior.value = best_ior;
     fit.sigma_a_per_m.value = sigma_for(best, {});
-    fit.cost = cost_of(best, pixels, fit.sigma_a_per_m.value, bright, {});
+    fit.cost = through_cost(best, pixels, fit.sigma_a_per_m.value, bright, {});
     fit.explained = share_explained(best);
     fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
 
@@ -242,7 +228,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         double least = 2.0;
         for (const std::size_t k : order) {
             const double cost =
-                cost_of(predicted[k], pixels, sigma_for(predicted[k], count), bright, count);
+                through_cost(predicted[k], pixels, sigma_for(predicted[k], count), bright, count);
             if (cost < least) {
                 least = cost;
                 at = k;
@@ -252,53 +238,25 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         const Rgb sigma = sigma_for(predicted[at], count);
         for (int c = 0; c < 3; ++c) sigmas[static_cast<std::size_t>(c)].push_back(sigma[c]);
     }
-    fit.ior.stddev =
-        options.known_ior ? 0.0 : std::hypot(standard_deviation(iors), kIorDoubtPerCost * fit.cost);
-    for (int c = 0; c < 3; ++c)
+    fit.ior.stddev = options.known_ior ? 0.0 : standard_deviation(iors);
+    for (int c = 0; c < 3 && !options.known_sigma_a; ++c)
         fit.sigma_a_per_m.stddev[c] =
-            static_cast<float>(std::hypot(standard_deviation(sigmas[static_cast<std::size_t>(c)]),
-                                          kAbsorptionDoubt + 0.03 * fit.sigma_a_per_m.value[c]));
+            static_cast<float>(standard_deviation(sigmas[static_cast<std::size_t>(c)]));
+    add_model_error(fit, options);
     fit.sigma_a_per_m.outcome = Outcome::Converged;
     if (options.known_ior) fit.ior.outcome = Outcome::Converged;
     if (fit.explained < kMinExplained) {
         fit.ior.outcome = fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
         fit.ior.reason = fit.sigma_a_per_m.reason =
             "too little of what is seen through the object is seen past it in another view";
-    } else if (!options.known_ior && greatest < kMinCostContrast * fit.cost) {
+    } else if (!options.known_ior &&
+               greatest < std::max(kMinCostContrast * fit.cost, fit.cost + kMinCostSpread)) {
         fit.ior.outcome = Outcome::NotIdentifiable;
         fit.ior.reason = "the background is too even: it looks the same through any index";
     } else if (!options.known_ior && fit.ior.stddev > 0.1) {
         fit.ior.outcome = Outcome::Ambiguous;
         fit.ior.reason = "different views ask for different indices";
     }
-    return fit;
-}
-
-TransparentFit fit_shell(const EstimationScene& scene, const FrameLookup& lookup, int object,
-                         const std::vector<ObjectPixel>& pixels, double bright,
-                         const TransparentOptions& options) {
-    TransparentFit fit;
-    fit.is_shell = true;
-    fit.wall_m = kDefaultWall;
-    const double ior = options.known_ior.value_or(options.shell_ior);
-    std::vector<ThroughPixel> through =
-        look_through_shell(scene, lookup, object, pixels, ior, options.ambient);
-    for (ThroughPixel& t : through) t.length_m *= static_cast<float>(kDefaultWall);
-    // Walls are thin: the weighted median over all lengths, without a least length.
-    for (ThroughPixel& t : through) t.length_m = std::max(t.length_m, kMinLength);
-    fit.sigma_a_per_m.value =
-        options.known_sigma_a.value_or(absorption_of(through, pixels, bright, {}));
-    fit.cost = cost_of(through, pixels, fit.sigma_a_per_m.value, bright, {});
-    fit.explained = share_explained(through);
-    fit.ior.value = ior;
-    fit.ior.stddev = 0.1;
-    fit.ior.outcome = options.known_ior ? Outcome::Converged : Outcome::NotIdentifiable;
-    fit.ior.reason = "thin walls hardly bend light: the index of common glass is assumed";
-    fit.sigma_a_per_m.stddev = Rgb::Constant(5.0f);
-    fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
-    fit.sigma_a_per_m.reason =
-        "walls too thin for a colour to build up; their thickness is a guess";
-    fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
     return fit;
 }
 

@@ -17,7 +17,7 @@ struct TransparentOptions {
     double ior_max = 2.00;
     double ior_step = 0.0;         ///< > 0: answers only on this grid (the paper's lambda)
     std::vector<double> ior_grid;  ///< answers only on these (a lambda that varies), rising
-    double shell_ior = 1.5;        ///< assumed for thin walls, which hardly bend light
+    double shell_ior = 1.5;        ///< assumed for vessels: thin walls hardly bend light
     Rgb ambient = Rgb::Zero();
     std::optional<double> known_ior;
     std::optional<Rgb> known_sigma_a;
@@ -38,39 +38,53 @@ struct ThroughPixel {
     }
 };
 
+constexpr double kMinSolidLength = 0.005;  ///< metres
+
 struct TransparentFit {
     Estimate<double> ior;
-    Estimate<Rgb> sigma_a_per_m;
+    Estimate<Rgb> sigma_a_per_m{Rgb::Zero(), Rgb::Zero(), 0.0, Outcome::NotIdentifiable, {}};
     double cost = 1.0;       ///< mean of min(|residual| / bright level, 0.25)
     double explained = 0.0;  ///< share of pixels with a prediction
     bool is_shell = false;
-    double wall_m = 0.0;
+    Estimate<double> wall_m;  ///< of a shell
 };
 
 /// Predicts all pixels for a solid of index `ior`.
 std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
                                        int object, const std::vector<ObjectPixel>& pixels,
                                        double ior, const Rgb& ambient);
-/// The same for a thin-walled vessel; lengths are for walls of 1 m.
-std::vector<ThroughPixel> look_through_shell(const EstimationScene& scene,
-                                             const FrameLookup& lookup, int object,
-                                             const std::vector<ObjectPixel>& pixels, double ior,
-                                             const Rgb& ambient);
+/// The same for a hollow vessel: the hull's surface and another `wall_m` further in.
+std::vector<ThroughPixel> look_through_vessel(const EstimationScene& scene,
+                                              const FrameLookup& lookup, int object,
+                                              const std::vector<ObjectPixel>& pixels, double ior,
+                                              double wall_m, const Rgb& ambient);
 
 /// Per channel the sigma_a >= 0 that minimises the absolute deviations of the logarithms, weighted
 /// by length: the weighted median of ln(r0 / r) / d (paper Eq. 14, exact minimiser).
+/// @param min_length_m shorter ways tell nothing of absorption
+/// @param count how often each pixel counts; empty: once
 Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<ObjectPixel>& pixels,
-                   double bright);
+                   double bright, double min_length_m = kMinSolidLength,
+                   const std::vector<int>& count = {});
 
 /// Mean robust cost of a prediction with absorption; pixels without one do not count.
 double through_cost(const std::vector<ThroughPixel>& through,
-                    const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright);
+                    const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright,
+                    const std::vector<int>& count = {});
+/// How often each pixel is drawn when whole views are drawn with replacement.
+std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view_count,
+                                std::uint64_t round);
+double share_explained(const std::vector<ThroughPixel>& through);
 
 /// Index by grid and golden section, absorption profiled out; deviations by resampling views.
 /// Costs about 1 s on two cores.
 TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup, int object,
                          const std::vector<ObjectPixel>& pixels, double bright,
                          const TransparentOptions& options);
+
+/// Wall thickness by a logarithmic grid of refracting shells of common glass (or the known index),
+/// tint profiled out; deviations by resampling views. The index bends thin walls' light too little
+/// to be found. Costs about 1 s on two cores.
 TransparentFit fit_shell(const EstimationScene& scene, const FrameLookup& lookup, int object,
                          const std::vector<ObjectPixel>& pixels, double bright,
                          const TransparentOptions& options);

@@ -2,6 +2,7 @@
 #include "base/log.h"
 #include "base/rng.h"
 #include "estimate/light_combinations.h"
+#include "estimate/model_error.h"
 #include "estimate/specular.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
@@ -23,6 +24,7 @@ constexpr double kBrushedGain = 0.1;
 constexpr double kMinBrushedRatio = 1.25;
 constexpr double kBrushedProbe = 1.5;  // factor of the first look at two roughnesses
 constexpr double kBrushedHint = 0.02;  // share it must win for a search to be worth its time
+constexpr double kMinLitShare = 0.02;  // of the pixels: less shows no lobe
 constexpr double kSqrt2 = 1.41421356237;
 
 enum class Use : std::uint8_t { None, Equal, AtLeast };
@@ -149,7 +151,7 @@ void set_deviations(const SpecularModel& model, const WardLobe& lobe, double bri
             rho[static_cast<std::size_t>(3 + c)].push_back(least.rho_s[c]);
         }
     }
-    fit.sigma.stddev = std::max(0.03 * fit.sigma.value, standard_deviation(sigmas));
+    fit.sigma.stddev = standard_deviation(sigmas);
     for (int c = 0; c < 3; ++c) {
         fit.stddev_rho_d[c] =
             static_cast<float>(standard_deviation(rho[static_cast<std::size_t>(c)]));
@@ -251,7 +253,12 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     }
     fit.lobe_share = lobe / all;
     correct_for_normals(fit, found.lobe, found.is_at_bound, options.normal_noise_rad);
+    if (model.lit_share() < kMinLitShare) {
+        fit.sigma.outcome = Outcome::NotIdentifiable;
+        fit.sigma.reason = "no lamp reaches what the pictures show of it: there is no highlight";
+    }
     set_deviations(model, found.lobe, bright, fit);
+    add_model_error(fit);
     if (options.is_certified) {
         WardBoundOptions bound;
         bound.sigma_min = options.sigma_min;

@@ -104,6 +104,9 @@ std::vector<std::string> uncertain_quantities(const SceneEstimate& estimate) {
                             object.ior.reason, sentences);
                 add_if_weak("the absorption of " + object.id, object.sigma_a_per_m.outcome,
                             object.sigma_a_per_m.reason, sentences);
+                if (object.is_hollow)
+                    add_if_weak("the wall of " + object.id, object.wall_m.outcome,
+                                object.wall_m.reason, sentences);
                 break;
             case ObjectClass::Specular:
                 for (const WardCluster& cluster : object.clusters) {

@@ -68,6 +68,12 @@ std::string object_rows(const JsonObject& object) {
         text += row({"", "absorption, 1/m", three(read_rgb(absorption, "value")),
                      "+- " + three(read_rgb(absorption, "stddev")), outcome_words(absorption)});
     }
+    if (object.has("wall_m")) {
+        const JsonObject wall = object.object("wall_m");
+        text += row({"", "wall", fmt::format("{:.1f} mm", 1e3 * wall.number("value")),
+                     fmt::format("+- {:.1f} mm", 1e3 * wall.number_or("stddev", 0.0)),
+                     outcome_words(wall)});
+    }
     if (object.has("clusters")) {
         for (const JsonObject& cluster : object.objects("clusters")) {
             text +=
@@ -163,7 +169,7 @@ void write_insertion_report(const fs::path& workspace, const std::string& captur
             "<p class=\"note\">No glass or metal was found: a valid scene, with diffuse things "
             "only.</p>\n";
     }
-    if (estimate.text_or("albedo_anchor", "") != "reference_albedo") {
+    if (estimate.text_or("albedo_anchor", "") == "mean_albedo") {
         body +=
             "<p class=\"note\">No reference albedo was given: light strengths and albedos are "
             "known "

@@ -1,0 +1,45 @@
+#include "estimate/light_outcome.h"
+
+#include "estimate/model_error.h"
+
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+constexpr double kMaxDirectionDeviationDeg = 15.0;  // more doubt is no answer
+
+}  // namespace
+
+FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_t k,
+                            bool is_distant) {
+    const PolarLight& polar = set.lights[k];
+    const TrialLight trial = to_trial(polar, fit.samples().reference_point);
+    FittedLight fitted;
+    fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
+    fitted.is_distant = is_distant;
+    const LightDeviation deviation = light_deviation(fit, set, k);
+    const double several = set.lights.size() > 1 ? kSeveralLamps : 1.0;
+    fitted.stddev_direction_deg =
+        degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, kModelDirectionRad));
+    fitted.stddev_distance_m =
+        polar.distance_m * std::hypot(deviation.log_distance, several * kModelLogDistance);
+    fitted.stddev_radius_m =
+        trial.radius_m * std::hypot(deviation.log_radius, deviation.log_distance, kModelLogRadius);
+    fitted.stddev_intensity_ratio =
+        std::hypot(2.0 * deviation.log_distance, several * kModelLogIntensity);
+    fitted.outcome = Outcome::Converged;
+    if (!deviation.is_identifiable || fitted.stddev_direction_deg > kMaxDirectionDeviationDeg) {
+        fitted.outcome = Outcome::NotIdentifiable;
+        fitted.reason = "no shadow or second surface tells where this light stands";
+    } else if (deviation.is_at_bound) {
+        fitted.outcome = Outcome::AtBound;
+        fitted.reason =
+            "the best place lies where lights are no longer looked for: within the scene or as "
+            "low as the table";
+    }
+    return fitted;
+}
+
+}  // namespace vitrine

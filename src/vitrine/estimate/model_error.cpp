@@ -1,0 +1,33 @@
+#include "estimate/model_error.h"
+
+#include <cmath>
+
+namespace vitrine {
+
+namespace {
+
+Rgb with_share(const Rgb& stddev, const Rgb& value, double constant, double ratio) {
+    Rgb sum;
+    for (int c = 0; c < 3; ++c)
+        sum[c] = static_cast<float>(std::hypot(stddev[c], constant + ratio * value[c]));
+    return sum;
+}
+
+}  // namespace
+
+void add_model_error(TransparentFit& solid, const TransparentOptions& options) {
+    if (!options.known_ior)
+        solid.ior.stddev = std::hypot(solid.ior.stddev, kModelIorPerCost * solid.cost);
+    if (!options.known_sigma_a)
+        solid.sigma_a_per_m.stddev =
+            with_share(solid.sigma_a_per_m.stddev, solid.sigma_a_per_m.value, kModelAbsorption,
+                       kModelAbsorptionRatio);
+}
+
+void add_model_error(WardFit& fit) {
+    fit.sigma.stddev = std::hypot(fit.sigma.stddev, kModelLogSigma * fit.sigma.value);
+    fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, kModelRhoD, kModelLogRhoD);
+    fit.stddev_rho_s = with_share(fit.stddev_rho_s, fit.ward.rho_s, 0.0, kModelLogRhoS);
+}
+
+}  // namespace vitrine

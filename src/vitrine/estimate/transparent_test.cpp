@@ -1,0 +1,117 @@
+#include "estimate/transparent.h"
+
+#include "estimate/object_pixels.h"
+#include "geometry/primitives.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace vitrine {
+namespace {
+
+/// A glass ball on a table, as `look_through` itself predicts it: recovery must be nearly exact.
+struct Ball {
+    Scene scene;
+    std::vector<RgbdFrame> frames;
+
+    /// @param pattern 0: table and surroundings of one even radiance
+    Ball(double ior, const Rgb& sigma_a, float pattern) {
+        Mesh table = make_plane(1.6, 0.0, 240);
+        table.colours.clear();
+        for (const Vec3f& v : table.vertices) {
+            const float wave = std::sin(90.0f * v.x()) * std::sin(70.0f * v.y() + 1.0f);
+            table.colours.push_back(Rgb::Constant(0.5f + 0.3f * pattern * wave));
+        }
+        Part scan, object;
+        scan.name = "scan";
+        scan.mesh = std::make_shared<const Mesh>(std::move(table));
+        object.name = "object_0";
+        object.mesh = std::make_shared<const Mesh>(make_sphere(0.045, Vec3(0, 0, 0.0455), 48));
+        scene.parts = {scan, object};
+        for (int k = 0; k < 5; ++k) {
+            const double angle = 2.0 * kPi * k / 5.0;
+            Camera camera;
+            camera.width = 120;
+            camera.height = 90;
+            camera.fx = camera.fy = 130;
+            camera.cx = 59.5;
+            camera.cy = 44.5;
+            camera.cam_from_world = look_at(Vec3(0.4 * std::cos(angle), 0.4 * std::sin(angle), 0.4),
+                                            Vec3(0, 0, 0.03), Vec3(0, 0, 1))
+                                        .inverse();
+            scene.cameras.push_back(camera);
+        }
+        const EstimationScene world(scene);
+        for (const Camera& camera : scene.cameras) {
+            RgbdFrame frame;
+            frame.id = std::to_string(frames.size());
+            frame.camera = camera;
+            frame.colour = ImageRgb(camera.width, camera.height);
+            const Vec3f eye = camera.centre_in_world().cast<float>();
+            for (int v = 0; v < camera.height; ++v)
+                for (int u = 0; u < camera.width; ++u) {
+                    const Vec3f ray = camera.ray_in_world(u, v).cast<float>();
+                    const Hit hit = world.accel().closest({eye, ray, 0.0f, 1e30f, kScanMask});
+                    const auto seen = world.scan_radiance(hit, ray);
+                    frame.colour(u, v) = seen ? *seen : kAmbient;
+                }
+            frames.push_back(std::move(frame));
+        }
+        const FrameLookup lookup(world, scene.cameras, frames, 1e9);
+        const std::vector<ObjectPixel> all =
+            object_pixels(world, lookup, 0, {.pixels_per_view = 100'000, .border_px = 0});
+        const std::vector<ThroughPixel> through =
+            look_through(world, lookup, 0, all, ior, kAmbient);
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            if (!through[i].is_valid) continue;
+            frames[static_cast<std::size_t>(all[i].frame)].colour(all[i].u, all[i].v) =
+                through[i].transmitted * (-sigma_a * through[i].length_m).exp() +
+                through[i].side_light(sigma_a);
+        }
+    }
+
+    TransparentFit fit(const TransparentOptions& extra = {}) const {
+        const EstimationScene world(scene);
+        const FrameLookup lookup(world, scene.cameras, frames, 1e9);
+        TransparentOptions options = extra;
+        options.ambient = kAmbient;
+        return fit_solid(world, lookup, 0, object_pixels(world, lookup, 0), bright_level(lookup),
+                         options);
+    }
+
+    inline static const Rgb kAmbient = Rgb::Constant(0.5f);
+};
+
+TEST(FitSolid, RecoversItsOwnPrediction) {
+    const Rgb sigma_a(4, 1, 8);
+    const TransparentFit fit = Ball(1.46, sigma_a, 1.0f).fit();
+    EXPECT_EQ(fit.ior.outcome, Outcome::Converged);
+    EXPECT_NEAR(fit.ior.value, 1.46, 0.01);
+    for (int c = 0; c < 3; ++c) EXPECT_NEAR(fit.sigma_a_per_m.value[c], sigma_a[c], 0.3);
+}
+
+TEST(FitSolid, SaysThatAnEvenBackgroundShowsNoIndex) {
+    const TransparentFit fit = Ball(1.5, Rgb::Zero(), 0.0f).fit();
+    EXPECT_EQ(fit.ior.outcome, Outcome::NotIdentifiable);
+    EXPECT_NE(fit.ior.reason.find("even"), std::string::npos);
+    EXPECT_TRUE(std::isfinite(fit.ior.value) && std::isfinite(fit.ior.stddev));
+}
+
+TEST(FitSolid, SaysWhenTheIndexLiesAtTheEndOfTheRange) {
+    TransparentOptions options;
+    options.ior_min = 1.4;
+    const TransparentFit fit = Ball(1.25, Rgb::Zero(), 1.0f).fit(options);
+    EXPECT_EQ(fit.ior.outcome, Outcome::AtBound);
+    EXPECT_FALSE(fit.ior.reason.empty());
+}
+
+TEST(FitSolid, AnswersOnTheGridAskedFor) {
+    TransparentOptions options;
+    options.ior_step = 0.02;
+    const TransparentFit fit = Ball(1.463, Rgb::Zero(), 1.0f).fit(options);
+    EXPECT_NEAR(fit.ior.value, 1.46, 1e-9);
+}
+
+}  // namespace
+}  // namespace vitrine
