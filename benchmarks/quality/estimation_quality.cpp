@@ -1,19 +1,23 @@
 // Errors of the estimators against known truth:
 //   vitrine_estimation_quality [--scan CACHE] [--pictures DIR] [--verbose] CAPTURE...
 // Without --scan the true meshes take the place of a reconstruction: what is left is the
-// estimators' own error.
+// estimators' own error. Ends with every bar as value, bar, pass.
 #include "base/log.h"
 #include "base/timer.h"
 #include "estimate/scene_estimate.h"
+#include "estimation_bars.h"
 #include "image/colour.h"
 #include "image/image_io.h"
 #include "truth_scene.h"
 
 #include <cstdio>
+#include <ctime>
 
 using namespace vitrine;
 
 namespace {
+
+constexpr double kMaxSeconds = 45.0;  // on two cores with nothing else to do
 
 void print_lights(const TrueScene& truth, const LightEstimate& estimate) {
     std::printf(
@@ -22,11 +26,8 @@ void print_lights(const TrueScene& truth, const LightEstimate& estimate) {
         estimate.error_initial, estimate.error_refined, estimate.residual_rms,
         estimate.ambient_radiance[1], truth.ambient_radiance[1], estimate.reference_point_m.x(),
         estimate.reference_point_m.y(), estimate.reference_point_m.z());
-    double grid_error = kPi;
-    for (const DiscLight& light : truth.lights)
-        grid_error = std::min(grid_error, angle_between(light.position_m - truth.reference_point_m,
-                                                        estimate.grid_direction));
-    std::printf("  best of the 36 grid lights: direction error %.2f deg\n", degrees(grid_error));
+    std::printf("  best of the 36 grid lights: direction error %.2f deg\n",
+                grid_error_deg(truth, estimate));
     for (const FittedLight& fitted : estimate.lights) {
         const DiscLight* nearest = nullptr;
         double error = 1e30;
@@ -80,14 +81,6 @@ void print_object(const TrueObject& truth, const ObjectEstimate& object) {
         }
 }
 
-const TrueObject* nearest_object(const TrueScene& truth, const Mesh& hull) {
-    const Vec3 centre = bounds(hull).centre();
-    const TrueObject* nearest = nullptr;
-    for (const TrueObject& object : truth.objects)
-        if ((object.centroid - centre).norm() < 0.06) nearest = &object;
-    return nearest;
-}
-
 /// What the cameras would see of the applied scene's albedo: shadows left in it show here.
 void write_albedo_picture(const Scene& applied, std::size_t frame, const std::string& path) {
     const EstimationScene world(applied);
@@ -107,6 +100,8 @@ void write_albedo_picture(const Scene& applied, std::size_t frame, const std::st
 
 int main(int argc, char** argv) {
     std::filesystem::path cache, pictures;
+    std::vector<Bar> bars;
+    std::vector<double> light_errors, grid_errors;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         if (argument == "--scan" && i + 1 < argc) {
@@ -129,8 +124,11 @@ int main(int argc, char** argv) {
         const Scene scene = cache.empty() ? make_true_geometry(folder, capture)
                                           : cached_reconstruction(capture, cache);
         Timer timer;
+        const std::clock_t start = std::clock();
         const SceneEstimate estimate = estimate_scene(scene, capture);
-        std::printf("estimation %.1f s:", timer.seconds());
+        const double cpu = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+        const double wall_seconds = timer.seconds();
+        std::printf("estimation %.1f s (CPU %.1f s):", wall_seconds, cpu);
         for (const auto& [part, seconds] : estimate.seconds)
             std::printf(" %s %.1f", part.c_str(), seconds);
         std::printf(", error %.4f -> %.4f, complete: %s\n", estimate.error_initial,
@@ -139,11 +137,20 @@ int main(int argc, char** argv) {
         const EstimationScene world(scene);
         for (int k = 0; k < world.object_count(); ++k) {
             const ObjectEstimate& object = estimate.objects[static_cast<std::size_t>(k)];
-            const TrueObject* match = nearest_object(truth, world.mesh(world.part_of_object(k)));
+            const TrueObject* match = object_at(truth, world.mesh(world.part_of_object(k)));
             TrueObject nothing;
             nothing.name = "nothing there";
             nothing.object_class = "diffuse";
             print_object(match ? *match : nothing, object);
+        }
+        const GeometrySource source =
+            cache.empty() ? GeometrySource::True : GeometrySource::Reconstructed;
+        add_light_bars(capture.name, truth, estimate.light, bars);
+        add_object_bars(capture.name, truth, scene, capture, estimate, source, bars);
+        bars.push_back({capture.name, "seconds of estimation", wall_seconds, kMaxSeconds, ""});
+        if (truth.lights.size() == 1 && !truth.objects.empty()) {
+            light_errors.push_back(light_error_deg(truth, truth.lights[0], estimate.light));
+            grid_errors.push_back(grid_error_deg(truth, estimate.light));
         }
         if (pictures.empty()) continue;
         timer = Timer();
@@ -156,4 +163,6 @@ int main(int argc, char** argv) {
                 (pictures / (capture.name + "_albedo_" + capture.frames[frame].id + ".png"))
                     .string());
     }
+    add_mean_bars(light_errors, grid_errors, bars);
+    print_bars(bars);
 }

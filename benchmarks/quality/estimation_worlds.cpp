@@ -2,8 +2,8 @@
 //   vitrine_estimation_worlds [--seeds FIRST:LAST] [--results FILE.jsonl] [--verbose]
 //   vitrine_estimation_worlds --report FILE.jsonl [FILE...] [--only odd|even]
 // Each world is one line of FILE; seeds already there are skipped, so a run can be stopped and
-// resumed, and several may run side by side on files of their own. Constants of the estimators are
-// set with the odd seeds; the even ones are what is reported.
+// resumed, and several may run side by side on files of their own. Seeds with which constants of
+// the estimators were set (docs/estimation.md) check nothing: report others.
 #include "base/log.h"
 #include "base/rng.h"
 #include "estimate/scene_estimate.h"

@@ -100,6 +100,7 @@ TrueScene read_truth(const std::filesystem::path& folder) {
         object.mesh = o["mesh"];
         const Json& m = o["material"];
         object.is_hollow = m["type"].get<std::string>().find("hollow") != std::string::npos;
+        object.wall_m = o.value("wall_thickness_m", 0.0);
         if (c == "transparent") {
             object.ior = m["ior"];
             object.sigma_a_per_m = rgb(m["sigma_a_per_metre"]);

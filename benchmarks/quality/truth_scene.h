@@ -14,6 +14,7 @@ struct TrueObject {
     std::string name, object_class;
     Vec3 centroid = Vec3::Zero();
     bool is_hollow = false;
+    double wall_m = 0.0;  ///< of a hollow one
     double ior = 0.0;
     Rgb sigma_a_per_m = Rgb::Zero();
     Rgb rho_d = Rgb::Zero(), rho_s = Rgb::Zero();

@@ -12,8 +12,6 @@ namespace vitrine {
 
 namespace {
 
-constexpr double kNoDeviation = -1.0;
-
 std::string kind_of(const WorldOptions& options) {
     const char* object = "nothing";
     switch (options.object) {
@@ -97,9 +95,10 @@ void add_light(const DiscLight& truth, const FittedLight& fitted, const Vec3& re
                    100.0 * fitted.stddev_distance_m / found.norm(), weak});
     out.push_back({name + "intensity_percent",
                    100.0 * (luminance(fitted.light.intensity_w_per_sr) / intensity - 1.0),
-                   kNoDeviation, weak});
+                   100.0 * fitted.stddev_intensity_ratio, weak});
     out.push_back({name + "disc_radius_percent",
-                   100.0 * (fitted.light.radius_m / truth.radius_m - 1.0), kNoDeviation, weak});
+                   100.0 * (fitted.light.radius_m / truth.radius_m - 1.0),
+                   100.0 * fitted.stddev_radius_m / fitted.light.radius_m, weak});
 }
 
 /// The fitted lobe over the true one, summed over the pixels that see the object under the first
@@ -128,7 +127,13 @@ void add_object(const WorldOptions& options, const World& world, const ObjectEst
                 std::vector<QuantityError>& out) {
     if (const auto* glass = std::get_if<Dielectric>(&world.truth.parts[1].material)) {
         if (object.object_class != ObjectClass::Transparent) return;
-        if (options.object == WorldObject::Vessel) return;
+        if (options.object == WorldObject::Vessel) {
+            if (object.is_hollow)
+                out.push_back({"wall_log2_ratio", std::log2(object.wall_m.value / world.wall_m),
+                               object.wall_m.stddev / (object.wall_m.value * std::log(2.0)),
+                               outcome_name(object.wall_m.outcome)});
+            return;
+        }
         if (object.is_hollow) return;
         out.push_back({"ior", object.ior.value - glass->ior, object.ior.stddev,
                        outcome_name(object.ior.outcome)});
