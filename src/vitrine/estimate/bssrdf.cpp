@@ -144,10 +144,9 @@ MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const M
         smooth_inside(diffuse, relief.mask, excluded, options.smoothing * relief.inradius_px);
     MatrixXd exitance(static_cast<Index>(observations.pixel.size()), 3);
     for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
-        const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
         exitance.row(static_cast<Index>(p)) =
             smooth[observations.pixel[p]].cast<double>().matrix().transpose() *
-            (kPi / fresnel_transmittance(cosine, surface_eta));
+            (kPi / leaving_transmittance(observations.normal[p], surface_eta));
     }
     double extent = 2 * relief.inradius_px;
     if (!relief.is_cluster())

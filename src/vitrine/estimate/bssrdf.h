@@ -25,7 +25,8 @@ enum class ProfileSolver {
 
 enum class ChannelCoupling {
     Free,     ///< each channel on its own
-    Ordered,  ///< same scattering, different absorption: the darker channel is the narrower one
+    Ordered,  ///< same scattering, different absorption: the darker channel is the narrower one,
+              ///< unless the picture speaks clearly against it
 };
 
 /// What the surface lets through. A dielectric's Fresnel transmittance is the physical choice;

@@ -61,6 +61,9 @@ VectorXd huber_weights(const VectorXd& residual, const VectorXd& base) {
     return weight;
 }
 
+/// A free profile that leaves less than this share of what an ordered one does refutes the order.
+constexpr double kRefuted = 0.7;
+
 struct PairFit {
     double a = 0, c = 0, cost = 1e300;
 };
@@ -82,7 +85,12 @@ PairFit solve_pair(double uu, double uv, double vv, double uy, double vy, double
     return best;
 }
 
-/// Best pair of lengths for columns `images` (one per length) under `weight`.
+RadialKernel plain_exponential(double length) {
+    return [length](double r) { return std::exp(-r / length); };
+}
+
+}  // namespace
+
 TwoExponentials best_pair(const MatrixXd& images, const VectorXd& y, const VectorXd& weight,
                           const std::vector<double>& lengths) {
     const MatrixXd weighted = weight.asDiagonal() * images;
@@ -103,12 +111,6 @@ TwoExponentials best_pair(const MatrixXd& images, const VectorXd& y, const Vecto
     }
     return best;
 }
-
-RadialKernel plain_exponential(double length) {
-    return [length](double r) { return std::exp(-r / length); };
-}
-
-}  // namespace
 
 ShellGrid make_shells(double step_px, double extent_px, int count) {
     ShellGrid shells;
@@ -261,7 +263,13 @@ RgbExponentials fit_ordered(const DistanceHistogram& histogram, const MatrixXd& 
         const double rho = trials[static_cast<std::size_t>(c)][i].rho;
         fit.a *= rho;
         fit.c *= rho;
-        result[static_cast<std::size_t>(c)] = fit;
+        const VectorXd y = exitance.col(c), weight = base_weights(y);
+        const auto misfit = [&](const TwoExponentials& trial) {
+            return (histogram.image_of(trial).col(c) - y).cwiseAbs2().dot(weight);
+        };
+        const TwoExponentials free = fit_exponentials(histogram, y, c, options);
+        const bool is_refuted = misfit(free) < kRefuted * misfit(fit);
+        result[static_cast<std::size_t>(c)] = is_refuted ? free : fit;
     };
     assign(first, best_one);
     assign(second, best_two);

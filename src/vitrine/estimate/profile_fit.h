@@ -38,6 +38,12 @@ PiecewiseProfile fit_piecewise_qmr(const DistanceHistogram& histogram,
                                    const Eigen::VectorXd& exitance, int field,
                                    const ProfileFitOptions& options);
 
+/// The pair of lengths, with amplitudes >= 0, that best explains y: amplitudes follow in closed
+/// form from inner products (variable projection), every pair is tried.
+/// @param images one column per length: the picture of e^{-r / length}; @param weight of squares
+TwoExponentials best_pair(const Eigen::MatrixXd& images, const Eigen::VectorXd& y,
+                          const Eigen::VectorXd& weight, const std::vector<double>& lengths);
+
 /// Two exponentials that best explain the exitance: for every pair of lengths on a grid the
 /// amplitudes follow in closed form (variable projection); robust weights (Huber, 4 rounds).
 TwoExponentials fit_exponentials(const DistanceHistogram& histogram,
@@ -49,7 +55,9 @@ TwoExponentials fit_exponentials_to_shells(const ShellGrid& shells, const Eigen:
                                            const ProfileFitOptions& options);
 
 /// Fits the brightest channel freely; the others are that profile with their own albedo and a
-/// width at most as large, ordered like the albedos: R_c(r) = rho_c R(r / s_c) / s_c^2.
+/// width at most as large, ordered like the albedos: R_c(r) = rho_c R(r / s_c) / s_c^2. A channel
+/// that a profile of its own explains far better (milk scatters blue light more than red) keeps
+/// that.
 /// @param exitance one column per channel; field c of the histogram belongs to channel c
 RgbExponentials fit_ordered(const DistanceHistogram& histogram, const Eigen::MatrixXd& exitance,
                             const ProfileFitOptions& options);

@@ -2,12 +2,11 @@
 
 #include "base/parallel.h"
 #include "base/rng.h"
-#include "estimate/distance_histogram.h"
+#include "estimate/few_lamps.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "math/nnls.h"
 #include "math/statistics.h"
-#include "render/relief_light.h"
 
 #include <numeric>
 
@@ -22,72 +21,31 @@ using Eigen::VectorXd;
 constexpr double kTypicalAlbedo = 0.6;
 /// Light thrown back by the ground is common, but dearer than a lamp: it must earn its place.
 constexpr double kGroundPrice = 2.0;
+/// Few lamps are cheaper than many.
+constexpr double kFewPrice = 0.3;
+/// Of the brightest channel's mean.
+constexpr double kDarkChannel = 0.05;
 
-/// The picture as the fit sees it: luminance over what leaves the surface, mean 1.
-VectorXd observed_exitance(const ImageRgb& diffuse, const ReliefObservations& observations,
+/// The picture as the fit sees it: what would leave through a surface that holds nothing back.
+MatrixXd observed_exitance(const ImageRgb& diffuse, const ReliefObservations& observations,
                            double eta) {
-    const ImageF y = gaussian_blur(luminance_image(diffuse), 1.0);
-    VectorXd result(static_cast<Index>(observations.pixel.size()));
+    const ImageRgb smooth = gaussian_blur(diffuse, 1.0);
+    MatrixXd result(static_cast<Index>(observations.pixel.size()), 3);
     for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
-        const double cosine = std::max(0.35, static_cast<double>(observations.normal[p].z()));
-        result[static_cast<Index>(p)] =
-            y[observations.pixel[p]] / fresnel_transmittance(cosine, eta);
+        result.row(static_cast<Index>(p)) =
+            smooth[observations.pixel[p]].cast<double>().matrix().transpose() /
+            leaving_transmittance(observations.normal[p], eta);
     }
-    return result / std::max(result.mean(), 1e-12);
+    return result;
 }
 
-/// Fields of unit lights over the samples (times area) and at the observations.
-struct Fields {
-    Eigen::MatrixXf source, local;
-};
-
-/// Columns: the directions, then (unless `sky` is null) light from everywhere and from below.
-void fill_fields(Eigen::MatrixXf& field, const Relief& relief, const SurfacePoints& points,
-                 const std::vector<Vec3>& directions, const SkyShares* sky,
-                 const TranslucencyLightOptions& options) {
-    const auto count = static_cast<Index>(directions.size());
-    const auto rows = static_cast<Index>(points.position.size());
-    field.resize(rows, count + (sky == nullptr ? 0 : 2));
-    for (Index l = 0; l < count; ++l) {
-        const Vec3& direction = directions[static_cast<std::size_t>(l)];
-        std::vector<float> seen(points.position.size(), 1.0f);
-        if (options.use_shadows) seen = visibility(relief, points, direction);
-        for (Index i = 0; i < rows; ++i) {
-            const auto k = static_cast<std::size_t>(i);
-            field(i, l) = seen[k] * static_cast<float>(entering_irradiance(points.normal[k],
-                                                                           direction, options.eta));
-        }
-    }
-    if (sky == nullptr) return;
-    for (Index i = 0; i < rows; ++i) {
-        field(i, count) = sky->ambient[static_cast<std::size_t>(i)];
-        field(i, count + 1) = sky->below[static_cast<std::size_t>(i)];
-    }
+/// Channels far darker than the brightest say little, and that with noise: zeros.
+MatrixXd without_dark_channels(MatrixXd exitance) {
+    const double brightest = exitance.colwise().mean().maxCoeff();
+    for (Index c = 0; c < 3; ++c)
+        if (exitance.col(c).mean() < kDarkChannel * brightest) exitance.col(c).setZero();
+    return exitance;
 }
-
-/// What the fit knows of the object: where light enters and where it is seen.
-struct Body {
-    const Relief& relief;
-    const ReliefSamples& samples;
-    const ReliefObservations& observations;
-    SkyShares sample_sky, observation_sky;
-
-    SurfacePoints sample_points() const { return {samples.position, samples.normal, samples.ball}; }
-    SurfacePoints observation_points() const {
-        return {observations.position, observations.normal, observations.ball};
-    }
-    Fields fields(const std::vector<Vec3>& directions, bool with_sky,
-                  const TranslucencyLightOptions& options) const {
-        Fields result;
-        fill_fields(result.source, relief, sample_points(), directions,
-                    with_sky ? &sample_sky : nullptr, options);
-        fill_fields(result.local, relief, observation_points(), directions,
-                    with_sky ? &observation_sky : nullptr, options);
-        for (Index i = 0; i < result.source.rows(); ++i)
-            result.source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
-        return result;
-    }
-};
 
 /// Weighted ridge NNLS for one kernel's image of all lights.
 struct Fit {
@@ -124,36 +82,6 @@ VectorXd robust_weights(const MatrixXd& image, const VectorXd& intensity, const 
         if (std::abs(residual[i]) > bend) result[i] *= std::sqrt(bend / std::abs(residual[i]));
     return result;
 }
-
-/// The image operator of one kernel, for lights that move: exitance = near * local + far * source.
-class KernelImage {
-  public:
-    KernelImage(const ReliefObservations& observations, const ReliefSamples& samples,
-                const RadialKernel& kernel, const CurvedBodyFactor& body)
-        : far_(static_cast<Index>(observations.position.size()),
-               static_cast<Index>(samples.position.size())) {
-        const CappedKernel capped(kernel, 1.5 * samples.step_px);
-        near_ = capped.near_share();
-        parallel_for(observations.position.size(), 8, [&](std::size_t p) {
-            for (std::size_t i = 0; i < samples.position.size(); ++i) {
-                float& entry = far_(static_cast<Index>(p), static_cast<Index>(i));
-                entry = 0;
-                if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
-                const float rise = chord_rise(samples.position[i], samples.normal[i],
-                                              observations.position[p], observations.normal[p]);
-                entry = static_cast<float>(
-                    capped((samples.position[i] - observations.position[p]).norm()) * body(rise));
-            }
-        });
-    }
-    MatrixXd operator()(const Fields& fields) const {
-        return (far_ * fields.source).cast<double>() + near_ * fields.local.cast<double>();
-    }
-
-  private:
-    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> far_;
-    double near_ = 0;
-};
 
 RadialKernel exponential(double g) {
     return [g](double r) { return std::exp(-r / g) / (2 * kPi * g * g); };
@@ -248,6 +176,27 @@ Rgbd ground_colour(const ImageRgb& picture, const Relief& relief) {
     return y > 1e-6 ? (sum / y).eval() : Rgbd::Ones().eval();
 }
 
+void set_lights(const FewLamps& lamps, const Rgbd& ground, ViewLightsEstimate& result) {
+    result.lights.lights.clear();
+    for (std::size_t l = 0; l < lamps.directions.size(); ++l) {
+        const double value = lamps.intensity[static_cast<Index>(l)];
+        if (value > 0) result.lights.lights.push_back({lamps.directions[l], Rgbd::Constant(value)});
+    }
+    std::stable_sort(
+        result.lights.lights.begin(), result.lights.lights.end(),
+        [](const ViewLight& a, const ViewLight& b) { return a.intensity[0] > b.intensity[0]; });
+    const auto sky = lamps.intensity.tail<2>();
+    result.lights.ambient = Rgbd::Constant(sky[0]);
+    result.lights.from_below = ground * sky[1];
+    result.relative_residual = lamps.relative_residual;
+    double sum = 0, count = 0;
+    for (const TwoExponentials& kernel : lamps.kernel) {
+        sum += kernel.mean_radius();
+        count += kernel.total() > 0 ? 1 : 0;
+    }
+    result.kernel_px = sum / std::max(count, 1.0);
+}
+
 }  // namespace
 
 void normalise_and_warn(ViewLightsEstimate& estimate, const Relief& relief, double eta) {
@@ -276,12 +225,13 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         result.reason = "too little of the object is free of highlights and rim";
         return result;
     }
-    const VectorXd y = observed_exitance(diffuse, observations, options.eta);
+    const MatrixXd exitance = observed_exitance(diffuse, observations, options.eta);
+    VectorXd y = exitance * Eigen::Vector3d(luminance(Rgbd(1, 0, 0)), luminance(Rgbd(0, 1, 0)),
+                                            luminance(Rgbd(0, 0, 1)));
+    y /= std::max(y.mean(), 1e-12);
     const VectorXd weight = y.cwiseMax(0.2).cwiseInverse();
-    const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
-    Body body{relief, samples, observations, {}, {}};
-    body.sample_sky = sky_shares(relief, body.sample_points());
-    body.observation_sky = sky_shares(relief, body.observation_points());
+    const LitRelief object(relief, sample_relief(relief, options.samples_per_side), observations,
+                           options.eta, options.use_shadows);
     const CurvedBodyFactor factor =
         options.use_curved_body ? curved_body_factor(kTypicalAlbedo) : CurvedBodyFactor{};
 
@@ -303,8 +253,9 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     price[count] = options.direction_penalty * std::pow(12.0, s);
     price[count + 1] = options.use_ground ? options.direction_penalty * kGroundPrice : 1e3;
 
-    const Fields fields = body.fields(directions, true, options);
-    const DistanceHistogram histogram(observations, samples, fields.source, fields.local, {factor});
+    const LightFields fields = object.fields(directions, true);
+    const DistanceHistogram histogram(observations, object.samples(), fields.source, fields.local,
+                                      {factor});
     progress.update(0.4, "lights: light fields");
 
     constexpr int kWidths = 5;
@@ -337,89 +288,26 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         if (fits[k].residual < fits[best].residual) best = k;
     progress.update(0.8, "lights: kernels");
 
-    const KernelChoice& choice = choices[best];
-    const double w1 = widths[static_cast<std::size_t>(choice.g1)];
-    const double w2 = widths[static_cast<std::size_t>(choice.g2)];
-    result.kernel_px = 2 * (choice.mix * w1 + (1 - choice.mix) * w2);
     result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
                                         options.merge_deg, options.max_lights);
-
     const std::vector<bool> is_held =
         snap_to_highlights(result.lights.lights, highlight_lights, options.merge_deg);
 
-    // The others move freely now, intensities follow: pattern search on the sphere.
-    std::vector<Vec3> few;
-    for (const ViewLight& light : result.lights.lights) few.push_back(light.direction);
-    const KernelImage image_of(
-        observations, samples,
-        [&](double r) {
-            return choice.mix * exponential(w1)(r) + (1 - choice.mix) * exponential(w2)(r);
-        },
-        factor);
-    const MatrixXd sky_columns = image_of(body.fields({}, true, options));
-    const auto column_of = [&](const Vec3& direction) -> VectorXd {
-        return image_of(body.fields({direction}, false, options)).col(0);
-    };
-    const auto solve = [&](const MatrixXd& columns, const std::vector<Vec3>& trial,
-                           const VectorXd& weights) {
-        VectorXd few_price(static_cast<Index>(trial.size()) + 2);
-        for (std::size_t l = 0; l < trial.size(); ++l) {
-            few_price[static_cast<Index>(l)] =
-                0.3 * options.direction_penalty * (1 + 3 * std::max(0.0, -trial[l].z()));
-        }
-        few_price.tail<2>() = price.tail<2>();
-        return fit_intensities(columns, y, weights, few_price);
-    };
-    MatrixXd few_image(y.size(), static_cast<Index>(few.size()) + 2);
-    for (std::size_t l = 0; l < few.size(); ++l)
-        few_image.col(static_cast<Index>(l)) = column_of(few[l]);
-    few_image.rightCols<2>() = sky_columns;
-    const VectorXd few_weight =
-        robust_weights(few_image, solve(few_image, few, weight).intensity, y, weight);
-    Fit final_fit = solve(few_image, few, few_weight);
-    const auto try_move = [&](std::size_t l, const Vec3& direction) {
-        std::vector<Vec3> trial = few;
-        trial[l] = direction;
-        MatrixXd image = few_image;
-        image.col(static_cast<Index>(l)) = column_of(direction);
-        const Fit fit = solve(image, trial, few_weight);
-        if (fit.residual >= final_fit.residual * (1 - 1e-3)) return false;
-        final_fit = fit;
-        few = trial;
-        few_image = image;
-        return true;
-    };
-    for (double step = radians(options.polish_deg); step > radians(1.0); step *= 0.5) {
-        for (int round = 0; round < 4; ++round) {
-            bool has_moved = false;
-            for (std::size_t l = 0; l < few.size(); ++l) {
-                if (is_held[l]) continue;
-                const Vec3 side = few[l].unitOrthogonal(), up = few[l].cross(side);
-                for (int k = 0; k < 6; ++k) {
-                    const double turn = k * kPi / 3;
-                    has_moved |= try_move(
-                        l, std::cos(step) * few[l] +
-                               std::sin(step) * (std::cos(turn) * side + std::sin(turn) * up));
-                }
-            }
-            if (!has_moved) break;
-        }
-        progress.update(0.9, "lights: directions");
-    }
-    std::vector<ViewLight> kept;
-    for (std::size_t l = 0; l < few.size(); ++l) {
-        const double value = final_fit.intensity[static_cast<Index>(l)];
-        if (value > 0) kept.push_back({few[l], Rgbd::Constant(value)});
-    }
-    std::stable_sort(kept.begin(), kept.end(), [](const ViewLight& a, const ViewLight& b) {
-        return a.intensity[0] > b.intensity[0];
-    });
-    result.lights.lights = std::move(kept);
-    result.lights.ambient = Rgbd::Constant(final_fit.intensity[static_cast<Index>(few.size())]);
-    result.lights.from_below =
-        ground_colour(diffuse, relief) * final_fit.intensity[static_cast<Index>(few.size()) + 1];
-    const VectorXd misfit = weight.cwiseProduct(few_image * final_fit.intensity - y);
-    result.relative_residual = std::sqrt(misfit.squaredNorm() / static_cast<double>(misfit.size()));
+    FewLampsOptions few;
+    few.shortest_px = g_low;
+    few.longest_px = g_high;
+    few.lamp_price = kFewPrice * options.direction_penalty;
+    few.ambient_price = price[count];
+    few.ground_price = price[count + 1];
+    few.first_step_deg = options.polish_deg;
+    few.use_curved_body = options.use_curved_body;
+    const Rgbd ground = ground_colour(diffuse, relief);
+    std::vector<Vec3> start;
+    for (const ViewLight& light : result.lights.lights) start.push_back(light.direction);
+    const FewLamps lamps =
+        fit_few_lamps(object, without_dark_channels(exitance), ground, start, is_held, few);
+    progress.update(1.0, "lights: directions");
+    set_lights(lamps, ground, result);
     if (result.lights.total() <= 0) {
         result.lights.ambient = Rgbd::Constant(kPi);
         result.outcome = Outcome::NotIdentifiable;

@@ -115,11 +115,6 @@ ImageRgb masked_blur(const ImageRgb& image, const Mask& mask, double sigma) {
     return weighted;
 }
 
-float transmittance_out(const Vec3f& normal, const TranslucentRenderOptions& options) {
-    return static_cast<float>(
-        fresnel_transmittance(std::max<double>(normal.z(), options.min_cos_out), options.eta));
-}
-
 Sources sources_from(const ReliefSamples& samples, const Relief& relief,
                      const ReliefIrradiance& irradiance) {
     Sources sources;
@@ -195,8 +190,8 @@ ImageRgb TranslucentRelief::render(const ReliefIrradiance& irradiance,
             const Rgb b = bicubic(lattice, (x + 0.5 - samples_.origin_x) / step - 0.5,
                                   (y + 0.5 - samples_.origin_y) / step - 0.5) +
                           near_share * near(x, y);
-            result(x, y) =
-                b.max(0.0f) * (transmittance_out(relief_.normals(x, y), options_) / kPif);
+            const double leaving = leaving_transmittance(relief_.normals(x, y), options_.eta);
+            result(x, y) = b.max(0.0f) * static_cast<float>(leaving / kPi);
         }
     });
     return result;
@@ -222,7 +217,8 @@ ImageRgb render_translucent_brute_force(const Relief& relief, const ReliefIrradi
                     gather_at(relief.point(x, y), relief.normals(x, y), sources, table, body, q_max)
                         .head<3>();
                 result(x, y) = (far + near_share * irradiance.front(x, y)) *
-                               (transmittance_out(relief.normals(x, y), options) / kPif);
+                               static_cast<float>(
+                                   leaving_transmittance(relief.normals(x, y), options.eta) / kPi);
             }
         });
     return result;

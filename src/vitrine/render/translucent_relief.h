@@ -7,12 +7,9 @@
 namespace vitrine {
 
 struct TranslucentRenderOptions {
-    int cells_per_side = 2500;  ///< mean error below 1 % of brute force (tested)
-    double eta = 1.3;           ///< for the light that leaves
-    double min_cos_out = 0.6;   ///< cosines to the viewer are raised to this in the transmittance
-                                ///< out: true rims get back by grazing reflection what they lose
-    bool use_curved_body =
-        true;  ///< C(s) of optics/curved_body.h; false: the flat R_d, as published
+    int cells_per_side = 2500;    ///< mean error below 1 % of brute force (tested)
+    double eta = 1.3;             ///< for the light that leaves
+    bool use_curved_body = true;  ///< C(s) of optics/curved_body.h; false: flat R_d, as published
 };
 
 /// Renders one relief under changing light and material (Jensen et al. 2001, Eq. 5):

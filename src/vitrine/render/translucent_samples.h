@@ -32,6 +32,14 @@ ReliefSamples sample_relief(const Relief& relief, int per_side);
 /// What a distant light of unit irradiance sends through a surface of normal n.
 double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta);
 
+/// What of the light beneath the surface leaves towards the viewer. Cosines are raised to
+/// kMinCosOut: true rims get back by grazing reflection what they lose. Renderer and estimators
+/// must agree on it: a difference at the rim reads as another material.
+constexpr double kMinCosOut = 0.6;
+inline double leaving_transmittance(const Vec3f& normal, double eta) {
+    return fresnel_transmittance(std::max<double>(normal.z(), kMinCosOut), eta);
+}
+
 /// Share of an even half-space of light about (0, -1, 0) that a surface of normal n faces.
 inline float facing_down(const Vec3f& normal) { return 0.5f * (1 - normal.y()); }
 

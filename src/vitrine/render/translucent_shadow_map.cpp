@@ -146,8 +146,7 @@ ImageRgb render_translucent_shadow_maps(const Relief& relief, const ViewLights& 
             if (!is_inside(relief.mask, x, y)) continue;
             Rgbd sum = Rgbd::Zero();
             for (const ShadowMap& map : maps) sum += map.gather(relief.point(x, y), level, profile);
-            const double out = fresnel_transmittance(
-                std::max<double>(relief.normals(x, y).z(), options.min_cos_out), options.eta);
+            const double out = leaving_transmittance(relief.normals(x, y), options.eta);
             result(x, y) = (sum * (out / kPi)).cast<float>();
         }
     });

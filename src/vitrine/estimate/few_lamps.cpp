@@ -1,0 +1,279 @@
+#include "estimate/few_lamps.h"
+
+#include "estimate/profile_fit.h"
+#include "math/nnls.h"
+#include "math/statistics.h"
+
+namespace vitrine {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kChannels = 3;
+/// Kernels and intensities in turn, from each start.
+constexpr int kTurns = 6;
+/// A picture's value below this share of its mean weighs no more than that.
+constexpr double kDarkest = 0.2;
+/// Of the brightest channel, for the gain of closed bodies.
+constexpr double kBrightestAlbedo = 0.7;
+
+TwoExponentials single_exponential(double length) {
+    return {1 / (2 * kPi * length * length), -1 / length, 0, -1 / length};
+}
+
+/// Images of the unit lights in one channel: one matrix (observations x lights) per length.
+using LengthImages = std::vector<MatrixXd>;
+
+class Fit {
+  public:
+    Fit(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
+        const FewLampsOptions& options)
+        : object_(object), ground_colour_(ground_colour), options_(options), y_(exitance) {
+        for (int i = 0; i < options.length_count; ++i) {
+            lengths_.push_back(options.shortest_px *
+                               std::pow(options.longest_px / options.shortest_px,
+                                        static_cast<double>(i) / (options.length_count - 1)));
+        }
+        weight_ = MatrixXd::Zero(y_.rows(), kChannels);
+        for (int c = 0; c < kChannels; ++c) {
+            mean_[c] = y_.col(c).mean();
+            if (mean_[c] <= 0) continue;
+            y_.col(c) /= mean_[c];
+            weight_.col(c) = y_.col(c).cwiseMax(kDarkest).cwiseInverse();
+        }
+        base_weight_ = weight_;
+        set_bodies(RgbExponentials{single_exponential(1), single_exponential(1),
+                                   single_exponential(1)});
+    }
+
+    /// Kernels and intensities for given directions, from every length as a start.
+    FewLamps fit_kernels(const std::vector<Vec3>& directions) const {
+        const LightFields fields = object_.fields(directions, true);
+        std::array<LengthImages, kChannels> images;
+        for (int c = 0; c < kChannels; ++c) {
+            const DistanceHistogram histogram(object_.observations(), object_.samples(),
+                                              fields.source, fields.local, {body_[c]});
+            for (const double length : lengths_) {
+                images[c].push_back(
+                    histogram.image_of([length](double r) { return std::exp(-r / length); }));
+                images[c].back().rightCols<1>() *= ground_colour_[c];
+            }
+        }
+        FewLamps best;
+        for (const double length : lengths_) {
+            FewLamps trial;
+            trial.directions = directions;
+            trial.kernel.fill(single_exponential(length));
+            for (int turn = 0; turn < kTurns; ++turn) {
+                solve_intensities(images_of(images, trial.kernel), trial);
+                fit_lengths(images, trial);
+            }
+            solve_intensities(images_of(images, trial.kernel), trial);
+            if (trial.misfit < best.misfit) best = trial;
+        }
+        return best;
+    }
+
+    /// Huber's weights from what `lamps` leaves: creases, ears and texture must not steer lamps.
+    void reweight(const FewLamps& lamps) {
+        const std::array<MatrixXd, kChannels> images = kernel_images(lamps);
+        weight_ = base_weight_;
+        for (int c = 0; c < kChannels; ++c) {
+            if (mean_[c] <= 0) continue;
+            const VectorXd residual =
+                base_weight_.col(c).cwiseProduct(images[c] * lamps.intensity - y_.col(c));
+            const double bend = 1.5 * std::max(1e-6, robust_sd(std::vector<double>(
+                                                         residual.data(),
+                                                         residual.data() + residual.size())));
+            for (Index i = 0; i < residual.size(); ++i) {
+                const double size = std::abs(residual[i]);
+                if (size > bend) weight_(i, c) *= std::sqrt(bend / size);
+            }
+        }
+    }
+
+    /// How much more a closed body passes follows from the albedos, up to the common factor.
+    void set_bodies(const RgbExponentials& kernel) {
+        std::array<double, kChannels> albedo{};
+        double brightest = 1e-12;
+        for (int c = 0; c < kChannels; ++c) {
+            albedo[c] = kernel[c].total() * mean_[c];
+            brightest = std::max(brightest, albedo[c]);
+        }
+        for (int c = 0; c < kChannels; ++c) {
+            body_[c] = options_.use_curved_body
+                           ? curved_body_factor(kBrightestAlbedo * albedo[c] / brightest)
+                           : CurvedBodyFactor{};
+        }
+    }
+
+    /// Moves the directions not held to where the misfit is least, kernels kept.
+    void move(FewLamps& lamps, const std::vector<bool>& is_held, double first_step_deg) const {
+        std::vector<KernelImage> operators;
+        for (int c = 0; c < kChannels; ++c)
+            operators.emplace_back(object_, lamps.kernel[c], body_[c]);
+        std::array<MatrixXd, kChannels> images = kernel_images(lamps);
+        solve_intensities(images, lamps);
+        const auto try_move = [&](std::size_t l, const Vec3& direction) {
+            FewLamps trial = lamps;
+            trial.directions[l] = direction;
+            const LightFields fields = object_.fields({direction}, false);
+            std::array<MatrixXd, kChannels> moved = images;
+            for (int c = 0; c < kChannels; ++c)
+                moved[c].col(static_cast<Index>(l)) = operators[c](fields).col(0);
+            solve_intensities(moved, trial);
+            if (trial.misfit >= lamps.misfit * (1 - 1e-3)) return false;
+            lamps = std::move(trial);
+            images = std::move(moved);
+            return true;
+        };
+        for (double step = radians(first_step_deg); step > radians(1.0); step *= 0.5) {
+            for (int round = 0; round < 4; ++round) {
+                bool has_moved = false;
+                for (std::size_t l = 0; l < lamps.directions.size(); ++l) {
+                    if (is_held[l]) continue;
+                    const Vec3 centre = lamps.directions[l];
+                    const Vec3 side = centre.unitOrthogonal(), up = centre.cross(side);
+                    for (int k = 0; k < 6; ++k) {
+                        const double turn = k * kPi / 3;
+                        has_moved |= try_move(
+                            l, std::cos(step) * centre +
+                                   std::sin(step) * (std::cos(turn) * side + std::sin(turn) * up));
+                    }
+                }
+                if (!has_moved) break;
+            }
+        }
+    }
+
+    double relative_residual(const FewLamps& lamps) const {
+        const std::array<MatrixXd, kChannels> images = kernel_images(lamps);
+        double sum = 0, count = 0;
+        for (int c = 0; c < kChannels; ++c) {
+            if (mean_[c] <= 0) continue;
+            sum += base_weight_.col(c)
+                       .cwiseProduct(images[c] * lamps.intensity - y_.col(c))
+                       .squaredNorm();
+            count += static_cast<double>(y_.rows());
+        }
+        return std::sqrt(sum / std::max(count, 1.0));
+    }
+
+  private:
+    std::array<MatrixXd, kChannels> images_of(const std::array<LengthImages, kChannels>& images,
+                                              const RgbExponentials& kernel) const {
+        std::array<MatrixXd, kChannels> result;
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            result[c] = MatrixXd::Zero(images[c][0].rows(), images[c][0].cols());
+            for (std::size_t i = 0; i < lengths_.size(); ++i) {
+                if (kernel[c].a > 0 && kernel[c].b == -1 / lengths_[i])
+                    result[c] += kernel[c].a * images[c][i];
+                if (kernel[c].c > 0 && kernel[c].d == -1 / lengths_[i])
+                    result[c] += kernel[c].c * images[c][i];
+            }
+        }
+        return result;
+    }
+
+    std::array<MatrixXd, kChannels> kernel_images(const FewLamps& lamps) const {
+        const LightFields fields = object_.fields(lamps.directions, true);
+        std::array<MatrixXd, kChannels> images;
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            images[c] = KernelImage(object_, lamps.kernel[c], body_[c])(fields);
+            images[c].rightCols<1>() *= ground_colour_[static_cast<int>(c)];
+        }
+        return images;
+    }
+
+    /// Non-negative least squares over all channels at once; sets the misfit too.
+    void solve_intensities(const std::array<MatrixXd, kChannels>& images, FewLamps& lamps) const {
+        const Index count = images[0].cols();
+        MatrixXd gram = MatrixXd::Zero(count, count);
+        VectorXd h = VectorXd::Zero(count);
+        double yy = 0;
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            const auto w = weight_.col(static_cast<Index>(c));
+            const MatrixXd a = w.asDiagonal() * images[c];
+            const VectorXd b = w.cwiseProduct(y_.col(static_cast<Index>(c)));
+            gram += a.transpose() * a;
+            h += a.transpose() * b;
+            yy += b.squaredNorm();
+        }
+        const double scale = gram.diagonal().cwiseSqrt().mean();
+        for (Index l = 0; l < count; ++l) {
+            double price = options_.ground_price;
+            if (l < count - 2) {
+                const Vec3& w = lamps.directions[static_cast<std::size_t>(l)];
+                price = options_.lamp_price * (1 + 3 * std::max(0.0, -w.z()));
+            } else if (l == count - 2) {
+                price = options_.ambient_price;
+            }
+            gram(l, l) += price * scale * price * scale;
+        }
+        lamps.intensity = solve_nnls_gram(gram, h).x;
+        lamps.misfit =
+            yy + lamps.intensity.dot(gram * lamps.intensity) - 2 * h.dot(lamps.intensity);
+    }
+
+    void fit_lengths(const std::array<LengthImages, kChannels>& images, FewLamps& lamps) const {
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            if (mean_[c] <= 0) continue;
+            MatrixXd lit(y_.rows(), static_cast<Index>(lengths_.size()));
+            for (std::size_t i = 0; i < lengths_.size(); ++i)
+                lit.col(static_cast<Index>(i)) = images[c][i] * lamps.intensity;
+            const auto column = static_cast<Index>(c);
+            lamps.kernel[c] =
+                best_pair(lit, y_.col(column), weight_.col(column).cwiseAbs2(), lengths_);
+        }
+    }
+
+    const LitRelief& object_;
+    Rgbd ground_colour_;
+    const FewLampsOptions& options_;
+    MatrixXd y_;  // exitance over its mean
+    std::array<double, kChannels> mean_{};
+    MatrixXd base_weight_, weight_;  // square roots
+    std::vector<double> lengths_;
+    std::array<CurvedBodyFactor, kChannels> body_;
+};
+
+/// Takes away the lamps that the picture hardly misses.
+void drop_needless(const Fit& fit, FewLamps& lamps, std::vector<bool>& is_held, double needless) {
+    for (std::size_t l = lamps.directions.size(); l-- > 0;) {
+        if (is_held[l] || lamps.directions.size() == 1) continue;
+        std::vector<Vec3> fewer = lamps.directions;
+        fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(l));
+        FewLamps without = fit.fit_kernels(fewer);
+        if (without.misfit > lamps.misfit * (1 + needless)) continue;
+        lamps = std::move(without);
+        is_held.erase(is_held.begin() + static_cast<std::ptrdiff_t>(l));
+    }
+}
+
+}  // namespace
+
+FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
+                       const std::vector<Vec3>& start, std::vector<bool> is_held,
+                       const FewLampsOptions& options) {
+    Fit fit(object, exitance, ground_colour, options);
+    FewLamps lamps = fit.fit_kernels(start);
+    const auto settle = [&] {
+        fit.set_bodies(lamps.kernel);
+        fit.reweight(lamps);
+        lamps = fit.fit_kernels(lamps.directions);
+    };
+    settle();
+    if (options.first_step_deg > 0) fit.move(lamps, is_held, options.first_step_deg);
+    settle();
+    drop_needless(fit, lamps, is_held, options.needless);
+    if (options.first_step_deg > 0) {
+        fit.move(lamps, is_held, 0.5 * options.first_step_deg);
+        settle();
+    }
+    lamps.relative_residual = fit.relative_residual(lamps);
+    return lamps;
+}
+
+}  // namespace vitrine

@@ -1,0 +1,45 @@
+// estimate/few_lamps.h: few lamps and what is beneath the surface, fitted to all channels at once.
+#pragma once
+
+#include "estimate/light_fields.h"
+#include "optics/radial_profile.h"
+
+#include <array>
+#include <vector>
+
+namespace vitrine {
+
+struct FewLampsOptions {
+    double shortest_px = 1, longest_px = 100;  ///< lengths that a kernel may be made of
+    int length_count = 9;
+    double lamp_price = 0.006;    ///< quadratic price of a lamp; from behind up to 4 times that
+    double ambient_price = 0.07;  ///< of light from everywhere
+    double ground_price = 0.04;   ///< of light from below
+    double first_step_deg = 8;    ///< of the search for better directions; 0: none
+    double needless = 0.02;       ///< a lamp without which the misfit grows by less goes
+    bool use_curved_body = true;  ///< optics/curved_body.h
+};
+
+/// Lamps and kernels that explain the picture together. Light is white but for the ground's.
+struct FewLamps {
+    std::vector<Vec3> directions;
+    Eigen::VectorXd intensity;  ///< of the directions, then from everywhere, then from below
+    std::array<TwoExponentials, 3> kernel;  ///< with the albedos, up to the common factor
+    double misfit = 1e300;                  ///< sum of squares, weighted, prices included
+    double relative_residual = 0;           ///< rms
+};
+
+/// Minimises over directions, intensities and one kernel of two exponentials per channel
+///   sum_c sum_p w_cp (sum_l x_l g_lc (K_c e_l)_p - y_cp)^2 + prices,  x >= 0,  Huber weights,
+/// y the exitance of each channel over its mean, e_l the fields of unit lamps, g the ground's
+/// colour. With one channel a narrow kernel under spread light looks like a wide one under a lamp;
+/// the same few white lamps must explain channels that scatter differently, which tells them apart.
+/// Kernels are found by variable projection (as in profile_fit.h) in turn with the intensities
+/// (non-negative least squares), from every length as a start; directions by pattern search.
+/// @param exitance observations x 3; a channel of zeros takes no part
+/// @param start directions to begin with; those `is_held` stay
+FewLamps fit_few_lamps(const LitRelief& object, const Eigen::MatrixXd& exitance,
+                       const Rgbd& ground_colour, const std::vector<Vec3>& start,
+                       std::vector<bool> is_held, const FewLampsOptions& options);
+
+}  // namespace vitrine

@@ -1,0 +1,77 @@
+#include "estimate/light_fields.h"
+
+#include "base/parallel.h"
+
+namespace vitrine {
+
+using Eigen::Index;
+
+LitRelief::LitRelief(const Relief& relief, ReliefSamples samples, ReliefObservations observations,
+                     double eta, bool use_shadows)
+    : relief_(relief),
+      samples_(std::move(samples)),
+      observations_(std::move(observations)),
+      sample_points_{samples_.position, samples_.normal, samples_.ball},
+      observation_points_{observations_.position, observations_.normal, observations_.ball},
+      sample_sky_(sky_shares(relief, sample_points_)),
+      observation_sky_(sky_shares(relief, observation_points_)),
+      eta_(eta),
+      use_shadows_(use_shadows) {}
+
+void LitRelief::fill(Eigen::MatrixXf& field, const SurfacePoints& points,
+                     const std::vector<Vec3>& directions, const SkyShares* sky) const {
+    const auto count = static_cast<Index>(directions.size());
+    const auto rows = static_cast<Index>(points.position.size());
+    field.resize(rows, count + (sky == nullptr ? 0 : 2));
+    for (Index l = 0; l < count; ++l) {
+        const Vec3& direction = directions[static_cast<std::size_t>(l)];
+        std::vector<float> seen(points.position.size(), 1.0f);
+        if (use_shadows_) seen = visibility(relief_, points, direction);
+        for (Index i = 0; i < rows; ++i) {
+            const auto k = static_cast<std::size_t>(i);
+            field(i, l) = seen[k] * static_cast<float>(
+                                        entering_irradiance(points.normal[k], direction, eta_));
+        }
+    }
+    if (sky == nullptr) return;
+    for (Index i = 0; i < rows; ++i) {
+        field(i, count) = sky->ambient[static_cast<std::size_t>(i)];
+        field(i, count + 1) = sky->below[static_cast<std::size_t>(i)];
+    }
+}
+
+LightFields LitRelief::fields(const std::vector<Vec3>& directions, bool with_sky) const {
+    LightFields result;
+    fill(result.source, sample_points_, directions, with_sky ? &sample_sky_ : nullptr);
+    fill(result.local, observation_points_, directions, with_sky ? &observation_sky_ : nullptr);
+    for (Index i = 0; i < result.source.rows(); ++i)
+        result.source.row(i) *= samples_.area_px2[static_cast<std::size_t>(i)];
+    return result;
+}
+
+KernelImage::KernelImage(const LitRelief& object, const RadialKernel& kernel,
+                         const CurvedBodyFactor& body)
+    : far_(static_cast<Index>(object.observations().position.size()),
+           static_cast<Index>(object.samples().position.size())) {
+    const ReliefSamples& samples = object.samples();
+    const ReliefObservations& observations = object.observations();
+    const CappedKernel capped(kernel, 1.5 * samples.step_px);
+    near_ = capped.near_share();
+    parallel_for(observations.position.size(), 8, [&](std::size_t p) {
+        for (std::size_t i = 0; i < samples.position.size(); ++i) {
+            float& entry = far_(static_cast<Index>(p), static_cast<Index>(i));
+            entry = 0;
+            if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
+            const float rise = chord_rise(samples.position[i], samples.normal[i],
+                                          observations.position[p], observations.normal[p]);
+            entry = static_cast<float>(
+                capped((samples.position[i] - observations.position[p]).norm()) * body(rise));
+        }
+    });
+}
+
+Eigen::MatrixXd KernelImage::operator()(const LightFields& fields) const {
+    return (far_ * fields.source).cast<double>() + near_ * fields.local.cast<double>();
+}
+
+}  // namespace vitrine
