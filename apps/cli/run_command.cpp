@@ -68,7 +68,8 @@ void add_stage(CLI::App& root, const std::string& name, const std::string& summa
                InsertionStage last) {
     CLI::App* command = root.add_subcommand(name, summary);
     auto arguments = std::make_shared<RunArguments>();
-    command->add_option("capture", arguments->capture, "Capture folder (TUM RGB-D layout)")
+    command
+        ->add_option("capture", arguments->capture, "Capture folder (layouts: see `vitrine check`)")
         ->required()
         ->group("Input");
     command

@@ -1,8 +1,12 @@
 // vitrine_reconstruction_quality [--out DIR] [--only objects|poses|track] [--threads N] [--verbose]
-// CAPTURE...
+// [--hires] CAPTURE...
+//
+// --hires puts the frames of truth/hires (three times as many pixels each way) in the place of the
+// frames of the same pose.
 //
 // Prints, for captures with a truth/ folder, how far the reconstruction is from the truth: fused
 // surface, objects, silhouettes, hulls, poses. The library itself never reads truth/.
+#include "base/json_reader.h"
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/rng.h"
@@ -11,6 +15,7 @@
 #include "image/filter.h"
 #include "image/image_io.h"
 #include "math/statistics.h"
+#include "process_cost.h"
 #include "reconstruct/labelled_scene.h"
 #include "reconstruct/pose_refinement.h"
 #include "reconstruct/tracking.h"
@@ -20,6 +25,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <set>
 
 namespace fs = std::filesystem;
@@ -81,6 +87,32 @@ SurfaceError surface_error(const Mesh& truth, const Mesh& hull) {
     return {median(distance), quantile(distance, 0.9), angle.empty() ? 180.0 : median(angle)};
 }
 
+/// Frames of truth/hires by the id of the frame that they stand for.
+std::map<std::string, fs::path> hires_frames(const fs::path& truth) {
+    std::map<std::string, fs::path> frames;
+    if (!fs::exists(truth / "scene.json") || !fs::is_directory(truth / "hires")) return frames;
+    const JsonObject scene = read_json_file(truth / "scene.json");
+    for (const JsonObject& view : scene.object("hires").objects("views")) {
+        frames[fmt::format("{:06d}", view.integer("same_pose_as_view"))] =
+            truth / "hires/rgb" / fmt::format("{:06d}.png", view.integer("index"));
+    }
+    return frames;
+}
+
+void use_hires(const fs::path& truth, Capture& capture) {
+    const auto hires = hires_frames(truth);
+    for (RgbdFrame& frame : capture.frames) {
+        const auto found = hires.find(frame.id);
+        if (found == hires.end()) continue;
+        frame.colour = read_linear_rgb(found->second);
+        for (Rgb& pixel : frame.colour) pixel *= static_cast<float>(capture.saturation_level);
+        const auto codes = read_png16(truth / "hires/depth" / found->second.filename());
+        frame.depth_m = ImageF(codes.width(), codes.height());
+        for (std::size_t p = 0; p < codes.size(); ++p) frame.depth_m[p] = float(codes[p]) / 5000.0f;
+        frame.camera = frame.camera.scaled(double(codes.width()) / frame.camera.width);
+    }
+}
+
 struct TrueObject {
     std::string name;
     std::vector<Mask> masks;
@@ -98,8 +130,13 @@ std::vector<TrueObject> read_objects(const fs::path& truth, const Capture& captu
     std::vector<TrueObject> objects;
     for (const std::string& name : names) {
         TrueObject object{name, {}, read_ply(truth / "mesh" / (name + ".ply"))};
+        const auto hires = hires_frames(truth);
         for (const RgbdFrame& frame : capture.frames) {
-            const fs::path path = truth / "mask" / (frame.id + "_" + name + ".png");
+            fs::path path = truth / "mask" / (frame.id + "_" + name + ".png");
+            if (frame.camera.width == 1920) {
+                path = truth / "hires/mask" /
+                       (hires.at(frame.id).stem().string() + "_" + name + ".png");
+            }
             object.masks.push_back(
                 fs::exists(path) ? read_mask(path) : Mask(frame.camera.width, frame.camera.height));
         }
@@ -315,7 +352,7 @@ void report_tracking(const Capture& capture) {
         if (!tracking.is_tracked[i]) lost += " " + capture.frames[i].id;
     }
     if (!lost.empty()) {
-        std::printf("  tracking refused: no connection to%s\n", lost.c_str());
+        std::printf("  tracking: no connection to%s\n", lost.c_str());
         return;
     }
     print_poses("tracked", pose_error(capture, tracking.cameras), timer.seconds());
@@ -325,15 +362,17 @@ void report_tracking(const Capture& capture) {
                 refined.cost_after);
 }
 
-void run(const fs::path& folder, const fs::path& out_root, const std::string& only) {
-    const Capture capture = read_capture(folder);
-    std::printf("%s\n", capture.name.c_str());
+void run(const fs::path& folder, const fs::path& out_root, const std::string& only, bool is_hires) {
+    Capture capture = read_capture(folder);
+    if (is_hires) use_hires(folder / "truth", capture);
+    std::printf("%s%s\n", capture.name.c_str(), is_hires ? ", with frames of 1920 x 1080" : "");
     const fs::path out = out_root.empty() ? fs::path() : out_root / capture.name;
     if (!out.empty()) fs::create_directories(out);
     if (only.empty() || only == "poses") report_poses(capture);
     if (only.empty() || only == "track") report_tracking(capture);
     if (only.empty() || only == "objects") {
         const Timer timer;
+        const CpuTimer cpu;
         ScanOptions options;
         options.poses = PoseMode::Keep;
         const Scan scan = make_scan(capture, options);
@@ -344,7 +383,9 @@ void run(const fs::path& folder, const fs::path& out_root, const std::string& on
         std::printf(
             "  time: scan %.1f s, candidates %.1f s, scene %.1f s; depth residual %.2f mm\n",
             scanned, found - scanned, timer.seconds() - found, 1e3 * scan.depth_residual_m);
-        report_surface(folder, capture, scene, options.max_depth_m);
+        std::printf("  in all %.1f s, %.1f CPU s, peak memory of the process %.0f MB\n",
+                    timer.seconds(), cpu.seconds(), peak_memory_mb());
+        if (!is_hires) report_surface(folder, capture, scene, options.max_depth_m);
         report_objects(folder, out, capture, scan, candidates);
         if (!out.empty()) {
             write_ply(out / "scan.ply", scan.mesh);
@@ -359,18 +400,21 @@ void run(const fs::path& folder, const fs::path& out_root, const std::string& on
 int main(int argc, char** argv) {
     fs::path out;
     std::string only;
+    bool is_hires = false;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         if (argument == "--out" && i + 1 < argc) {
             out = argv[++i];
         } else if (argument == "--only" && i + 1 < argc) {
             only = argv[++i];
+        } else if (argument == "--hires") {
+            is_hires = true;
         } else if (argument == "--verbose") {
             vitrine::set_log_level(vitrine::LogLevel::Debug);
         } else if (argument == "--threads" && i + 1 < argc) {
             vitrine::set_thread_count(std::atoi(argv[++i]));
         } else {
-            vitrine::run(argument, out, only);
+            vitrine::run(argument, out, only, is_hires);
         }
     }
     return 0;

@@ -1,6 +1,7 @@
 #include "base/error.h"
 #include "base/file.h"
 #include "base/rng.h"
+#include "base/scratch_folder.h"
 #include "geometry/camera.h"
 #include "geometry/even_samples.h"
 #include "geometry/mesh.h"
@@ -11,8 +12,6 @@
 #include "geometry/scalar_grid.h"
 
 #include <gtest/gtest.h>
-
-#include <unistd.h>
 
 namespace vitrine {
 namespace {
@@ -71,10 +70,7 @@ TEST(Mesh, NormalsCreasesAndComponents) {
 
 class MeshIo : public testing::Test {
   protected:
-    fs::path folder_ =
-        fs::temp_directory_path() / ("vitrine_mesh_io_" + std::to_string(::getpid()));
-    void SetUp() override { fs::create_directories(folder_); }
-    void TearDown() override { fs::remove_all(folder_); }
+    ScratchFolder folder_{"mesh_io"};
 };
 
 TEST_F(MeshIo, PlyRoundTripKeepsEverything) {

@@ -2,19 +2,16 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/scratch_folder.h"
 
 #include <gtest/gtest.h>
-
-#include <unistd.h>
 
 namespace vitrine {
 namespace {
 
-namespace fs = std::filesystem;
-
 class GltfIo : public testing::Test {
   protected:
-    fs::path folder_ = fs::temp_directory_path() / ("vitrine_gltf_" + std::to_string(::getpid()));
+    ScratchFolder folder_{"gltf"};
     void SetUp() override {
         const float points[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
         const std::uint16_t indices[3] = {0, 1, 2};
@@ -22,8 +19,6 @@ class GltfIo : public testing::Test {
         data.append(reinterpret_cast<const char*>(indices), sizeof indices);
         write_text_file(folder_ / "t.bin", data);
     }
-    void TearDown() override { fs::remove_all(folder_); }
-
     std::string text(const std::string& uri = "t.bin", int index_count = 3, int bytes = 42) {
         return fmt::format(
             R"({{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}],

@@ -1,6 +1,7 @@
 #include "image/image_io.h"
 
 #include "base/file.h"
+#include "base/scratch_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -13,10 +14,7 @@ namespace fs = std::filesystem;
 
 class ImageIo : public testing::Test {
   protected:
-    fs::path folder_ =
-        fs::temp_directory_path() / ("vitrine_image_io_" + std::to_string(::getpid()));
-    void SetUp() override { fs::create_directories(folder_); }
-    void TearDown() override { fs::remove_all(folder_); }
+    ScratchFolder folder_{"image_io"};
 };
 
 TEST_F(ImageIo, Png8And16RoundTrip) {

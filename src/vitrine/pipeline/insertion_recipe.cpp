@@ -22,19 +22,18 @@ namespace vitrine {
 namespace fs = std::filesystem;
 namespace {
 
-/// Hash of what a capture's reader looks at; pictures of truth and insertion files do not count.
+/// Hash of what the capture's reader looks at; pictures of truth and insertion files do not count.
 std::string hash_capture(const fs::path& folder) {
-    std::uint64_t hash = hash_bytes("");
+    std::vector<std::string> files;
     for (const fs::path& file : capture_files(folder)) {
-        const std::string name = fs::relative(file, folder).string();
-        hash = hash_bytes(fmt::format("{} {:016x}", name, hash_file(file)), hash);
+        files.push_back(fs::relative(file, folder).string());
     }
-    return fmt::format("{:016x}", hash);
+    return hash_files(folder, files);
 }
 
 std::string hash_if_given(const fs::path& path) {
     if (path.empty()) return "none";
-    if (fs::is_directory(path)) return hash_folder(path, {});
+    if (fs::is_directory(path)) return hash_folder(path);
     return fs::exists(path) ? fmt::format("{:016x}", hash_file(path)) : "missing";
 }
 
@@ -156,21 +155,34 @@ class InsertionRun {
                            make_scan(capture_, scan_options, progress_("reconstruct")), capture_);
             },
             [&] { return files_below(workspace_.folder(), "10_scan"); });
+        scan_ = read_scan(workspace_.path("10_scan"), capture_);
+        capture_ = frames_of_scan(std::move(capture_), scan_);
+        for (const std::string& id : scan_.dropped) {
+            result_.warnings.push_back("frame " + id + " dropped: its pose could not be found");
+        }
     }
 
     void candidates() {
-        const fs::path edits = workspace_.path("edits/silhouettes");
+        const fs::path edits = workspace_.path("edits");
         identity_ = workspace_.run_stage(
             "candidates", {identity_, hash_if_given(options_.geometry), hash_if_given(edits)},
             [&] {
                 CandidateOptions candidate_options;
-                candidate_options.edited_silhouettes = read_edited_silhouettes(edits, capture_);
+                candidate_options.edited_silhouettes =
+                    read_edited_silhouettes(edits / "silhouettes", capture_);
+                candidate_options.boxes = read_edited_boxes(edits / "boxes.json", capture_, scan_);
                 Candidates found =
-                    find_candidates(capture_, scan(), candidate_options, progress_("candidates"));
+                    find_candidates(capture_, scan_, candidate_options, progress_("candidates"));
                 if (!options_.geometry.empty()) replace_hulls(found, options_.geometry);
                 write_candidates(workspace_.path("20_candidates"), found, capture_);
             },
             [&] { return files_below(workspace_.folder(), "20_candidates"); });
+        const Candidates found = read_candidates(workspace_.path("20_candidates"), capture_);
+        if (static_cast<int>(capture_.frames.size()) < CandidateOptions().min_views) {
+            result_.uncertain.insert(result_.uncertain.end(), found.notes.begin(),
+                                     found.notes.end());
+        }
+        scene_ = build_scene(scan_, found);
     }
 
     EstimateOptions estimate_options() const {
@@ -200,7 +212,7 @@ class InsertionRun {
              method_identity()},
             [&] {
                 SceneEstimate first;
-                first.light = estimate_first_light(scene(), capture_, estimate_options(),
+                first.light = estimate_first_light(scene_, capture_, estimate_options(),
                                                    progress_("lights"));
                 first.method = options_.method;
                 write_estimate(workspace_.path("30_lights.json"), first);
@@ -243,12 +255,12 @@ class InsertionRun {
                 set_ior_step(options);
                 options.first_light = read_estimate(workspace_.path("30_lights.json")).light;
                 SceneEstimate estimate =
-                    estimate_scene(scene(), capture_, options, progress_("materials"));
+                    estimate_scene(scene_, capture_, options, progress_("materials"));
                 for (ObjectEstimate& object : estimate.objects) {
                     object.mesh_file = "20_candidates/" + object.id + ".ply";
                 }
                 write_estimate(workspace_.path("estimate.json"), estimate);
-                const Scene measured = apply(scene(), estimate);
+                const Scene measured = apply(scene_, estimate);
                 write_materials(workspace_.path("40_materials.json"), measured);
                 write_scene(workspace_.path("40_scene/scene.json"), measured);
             },
@@ -257,7 +269,10 @@ class InsertionRun {
                 files.insert(files.end(), {"40_materials.json", "estimate.json"});
                 return files;
             });
-        result_.uncertain = uncertain_quantities(read_estimate(workspace_.path("estimate.json")));
+        for (std::string& sentence :
+             uncertain_quantities(read_estimate(workspace_.path("estimate.json")))) {
+            result_.uncertain.push_back(std::move(sentence));
+        }
     }
 
     void insert() {
@@ -282,11 +297,11 @@ class InsertionRun {
     }
 
     void render_insertion() {
-        const Scene labelled = scene();
+        const Scene labelled = scene_;
         Insertion insertion;
         if (options_.at) {
             insertion = place_on_surface(options_.insertion, *options_.at, labelled,
-                                         scan().support_plane.normal);
+                                         scan_.support_plane.normal);
         } else {
             insertion = read_insertion(options_.insertion);
         }
@@ -350,16 +365,13 @@ class InsertionRun {
                           "frames of the capture (" + join(ids, " ") + ")", "\"" + id + "\"", ""});
     }
 
-    Scan scan() const { return read_scan(workspace_.path("10_scan"), capture_); }
-    Scene scene() const {
-        return build_scene(scan(), read_candidates(workspace_.path("20_candidates"), capture_));
-    }
-
     Workspace& workspace_;
     InsertionRunOptions options_;
     StageProgress progress_;
     std::string capture_hash_;
-    Capture capture_;
+    Capture capture_;  ///< from the first stage on, as the scan knows it
+    Scan scan_;
+    Scene scene_;  ///< labelled, as the candidates leave it
     std::string identity_;
     InsertionRunResult result_;
 };

@@ -22,4 +22,11 @@ Candidates read_candidates(const std::filesystem::path& folder, const Capture& c
 std::map<std::pair<std::string, std::string>, Mask> read_edited_silhouettes(
     const std::filesystem::path& folder, const Capture& capture);
 
+/// Boxes that the user gives, edits/boxes.json: {"schema": "vitrine.boxes/1", "boxes": [...]}, each
+/// {"min_m": [3], "max_m": [3]} in the world, or {"frame": id, "box_px": [x, y, width, height]}
+/// around an object in a picture: what stands on the support plane there, as deep as it is wide.
+/// No file, no boxes. @throws InputError
+std::vector<Box3> read_edited_boxes(const std::filesystem::path& file, const Capture& capture,
+                                    const Scan& scan);
+
 }  // namespace vitrine

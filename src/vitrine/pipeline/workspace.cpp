@@ -172,14 +172,16 @@ std::vector<std::string> files_below(const fs::path& folder, const std::string& 
     return files;
 }
 
-std::string hash_folder(const fs::path& folder, const std::vector<std::string>& excluded) {
+std::string hash_files(const fs::path& folder, const std::vector<std::string>& files) {
     std::uint64_t hash = hash_bytes("");
-    for (const std::string& file : files_below(folder, "")) {
-        const std::string top = fs::path(file).begin()->string();
-        if (std::find(excluded.begin(), excluded.end(), top) != excluded.end()) continue;
+    for (const std::string& file : files) {
         hash = hash_bytes(file + " " + hex(hash_file(folder / file)), hash);
     }
     return hex(hash);
+}
+
+std::string hash_folder(const fs::path& folder) {
+    return hash_files(folder, files_below(folder, ""));
 }
 
 }  // namespace vitrine

@@ -74,9 +74,10 @@ class Workspace {
     std::function<void(const std::string&, double, bool)> listener_;
 };
 
-/// Hash of the names and contents of all regular files below `folder`, without `excluded` folders.
-std::string hash_folder(const std::filesystem::path& folder,
-                        const std::vector<std::string>& excluded);
+/// Hash of the names and contents of files given relative to `folder`, in their order.
+std::string hash_files(const std::filesystem::path& folder, const std::vector<std::string>& files);
+/// Hash of the names and contents of all regular files below `folder`.
+std::string hash_folder(const std::filesystem::path& folder);
 /// Files below `folder / sub`, relative to `folder`, sorted.
 std::vector<std::string> files_below(const std::filesystem::path& folder, const std::string& sub);
 

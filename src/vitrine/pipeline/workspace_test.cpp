@@ -2,13 +2,12 @@
 
 #include "base/error.h"
 #include "base/file.h"
+#include "base/scratch_folder.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <sys/wait.h>
-#include <unistd.h>
-
 namespace vitrine {
 namespace {
 
@@ -16,11 +15,9 @@ namespace fs = std::filesystem;
 
 class WorkspaceTest : public testing::Test {
   protected:
-    fs::path folder_ =
-        fs::temp_directory_path() / ("vitrine_workspace_" + std::to_string(::getpid()));
+    ScratchFolder folder_{"workspace"};
     int runs_ = 0;
 
-    void TearDown() override { fs::remove_all(folder_); }
     std::string run(Workspace& workspace, const std::string& options) {
         return workspace.run_stage(
             "first", {options},

@@ -1,9 +1,11 @@
 #include "reconstruct/candidates.h"
 
 #include "base/log.h"
+#include "base/text.h"
 #include "image/filter.h"
 #include "reconstruct/candidate_views.h"
 #include "reconstruct/revolution.h"
+#include "reconstruct/support_doubt.h"
 #include "reconstruct/visual_hull.h"
 #include "reconstruct/vote_grid.h"
 #include "trace/depth_map.h"
@@ -119,6 +121,19 @@ VoxelCluster cluster_of_box(const ScalarGrid& grid, const Box3& box) {
     return cluster;
 }
 
+/// Does most of a region lie in one of the boxes?
+bool is_in_a_box(const ScalarGrid& grid, const VoxelCluster& cluster,
+                 const std::vector<Box3>& boxes) {
+    return std::any_of(boxes.begin(), boxes.end(), [&](const Box3& box) {
+        const auto inside =
+            std::count_if(cluster.nodes.begin(), cluster.nodes.end(), [&](std::size_t node) {
+                const Eigen::Vector3i c = grid.node_of(node);
+                return box.contains(grid.node(c.x(), c.y(), c.z()));
+            });
+        return 2 * static_cast<std::size_t>(inside) > cluster.nodes.size();
+    });
+}
+
 void render(const SceneViews& views, double growth_m, Growing& object) {
     const Plane& support = views.scan->support_plane;
     object.images = render_body(views, hull_mesh(object.body, 0.0, 0.0, support),
@@ -189,6 +204,19 @@ void use_edit(const Mask& edit, const std::string& id, SilhouetteView& view) {
     view.hidden = Mask(edit.width(), edit.height());
     view.box = PixelBox::of(edit).grown(kBoxMargin_px, edit.width(), edit.height());
     view.is_fixed = true;
+}
+
+/// An edit of an object that does not exist would be lost without a word.
+void require_known_edits(const CandidateOptions& options, const std::vector<Growing>& objects) {
+    std::vector<std::string> ids;
+    for (const Growing& object : objects) ids.push_back(object.id);
+    for (const auto& [key, mask] : options.edited_silhouettes) {
+        if (std::find(ids.begin(), ids.end(), key.first) != ids.end()) continue;
+        throw InputError(
+            {"edited silhouette " + key.second + "_" + key.first + ".png",
+             ids.empty() ? "no edits: there is no candidate" : "one of " + join(ids, ", "),
+             key.first, "a box in edits/boxes.json makes a candidate"});
+    }
 }
 
 void draw_outlines(const SceneViews& views, const CandidateOptions& options,
@@ -292,6 +320,34 @@ Revolution try_revolution(const SceneViews& views, double hull_residual_px, Grow
     return result;
 }
 
+void note_doubtful_support(const SceneViews& views, const CandidateOptions& options,
+                           Candidates& result) {
+    constexpr double kMinShare = 0.15;  // an object's own footprint is less
+    const SupportDoubt doubt = doubt_support(views, options.min_views, options.min_bad_fraction);
+    if (doubt.doubtful_m2 < kMinShare * doubt.seen_m2) return;
+    result.notes.push_back(
+        fmt::format("{:.0f} % of the support surface ({:.0f} cm2) has no or wrong depth in most "
+                    "views: polished metal, glass or a glossy varnish; a plane stands for it",
+                    100 * doubt.doubtful_m2 / doubt.seen_m2, 1e4 * doubt.doubtful_m2));
+}
+
+Candidates outlines_only(const Capture& capture, const Scan& scan) {
+    Candidates result;
+    for (std::size_t i = 0; i < capture.frames.size(); ++i) {
+        for (Outline& outline : find_outlines(capture.frames[i], scan.cameras[i],
+                                              scan.support_plane, capture.saturation_level)) {
+            result.outlines.push_back(std::move(outline));
+        }
+    }
+    result.notes.push_back(
+        fmt::format("{} view{}: {} outline{} only. A shape takes at least 3 views from around the "
+                    "scene, a good "
+                    "one 12; what an object is made of takes its shape",
+                    capture.frames.size(), capture.frames.size() == 1 ? "" : "s",
+                    result.outlines.size(), result.outlines.size() == 1 ? "" : "s"));
+    return result;
+}
+
 std::string evidence_of(const Candidate& candidate, std::size_t views) {
     return fmt::format("{:.0f} % of its pixels have no or wrong depth, agreed by {} views",
                        100 * candidate.bad_depth_fraction, views);
@@ -332,29 +388,40 @@ Candidates find_candidates(const Capture& capture, const Scan& scan,
                            const CandidateOptions& options, const Progress& progress) {
     VITRINE_CHECK_EQ(capture.frames.size(), scan.cameras.size());
     Candidates result;
+    if (static_cast<int>(capture.frames.size()) < options.min_views) {
+        return outlines_only(capture, scan);
+    }
     progress.update(0.0, "voting for bad depth");
     SceneViews views = make_scene_views(capture, scan, {}, kMaxDepth_m);
     const Votes votes = vote(views, options);
+    note_doubtful_support(views, options, result);
     std::vector<Growing> objects;
     std::vector<Box3> bodies;
-    for (const VoxelCluster& cluster : votes.clusters) {
-        if (base_height(cluster, scan.support_plane) > kMaxBase_m) continue;
+    const auto add = [&](VoxelCluster cluster) {
         Growing object;
-        object.cluster = cluster;
-        object.body = body_of_cluster(votes.fraction, cluster);
-        object.id = fmt::format("object_{}", objects.size());
-        bodies.push_back(grown(cluster.box, kGrowth_m));
-        objects.push_back(std::move(object));
-    }
-    for (const Box3& box : options.boxes) {
-        Growing object;
-        object.cluster = cluster_of_box(votes.fraction, box);
-        if (object.cluster.nodes.empty()) continue;
+        object.cluster = std::move(cluster);
         object.body = body_of_cluster(votes.fraction, object.cluster);
         object.id = fmt::format("object_{}", objects.size());
         bodies.push_back(grown(object.cluster.box, kGrowth_m));
         objects.push_back(std::move(object));
+    };
+    for (const VoxelCluster& cluster : votes.clusters) {
+        if (base_height(cluster, scan.support_plane) > kMaxBase_m) continue;
+        if (!is_in_a_box(votes.fraction, cluster, options.boxes)) add(cluster);
     }
+    for (const Box3& box : options.boxes) {
+        VoxelCluster cluster = cluster_of_box(votes.fraction, box);
+        if (!cluster.nodes.empty()) {
+            add(std::move(cluster));
+            continue;
+        }
+        const Vec3 centre = box.centre();
+        result.notes.push_back(
+            fmt::format("the box around ({:.3f}, {:.3f}, {:.3f}) m is not above the support "
+                        "surface and is left out",
+                        centre.x(), centre.y(), centre.z()));
+    }
+    require_known_edits(options, objects);
     if (objects.empty()) {
         result.notes.push_back("no region where depth is missing or wrong in several views");
         return result;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "reconstruct/scan.h"
+#include "reconstruct/single_view.h"
 
 #include <map>
 #include <string>
@@ -22,7 +23,8 @@ struct CandidateOptions {
     bool use_symmetry = true;  ///< complete bodies of revolution by their symmetry
     /// Silhouettes edited by the user, by (candidate id, frame id): taken as they are.
     std::map<std::pair<std::string, std::string>, Mask> edited_silhouettes;
-    /// Boxes given by the user, in the world: each becomes a candidate even without bad depth.
+    /// Boxes given by the user, in the world: each becomes a candidate even without bad depth, and
+    /// replaces what was found inside it.
     std::vector<Box3> boxes;
 };
 
@@ -48,10 +50,13 @@ struct Candidate {
 
 struct Candidates {
     std::vector<Candidate> objects;
+    std::vector<Outline> outlines;  ///< of a capture with too few views for shapes; then no objects
     std::vector<std::string> notes;
 };
 
-/// Cost: about 1 s a view and object at 640x360 on two cores. No candidates is a valid answer.
+/// Fewer than `min_views` frames give outlines only (single_view.h), and the notes say what is
+/// missing. Cost: about 1 s a view and object at 640x360 on two cores. No candidates is a valid
+/// answer.
 Candidates find_candidates(const Capture& capture, const Scan& scan,
                            const CandidateOptions& options = {}, const Progress& progress = {});
 

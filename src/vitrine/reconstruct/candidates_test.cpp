@@ -1,6 +1,7 @@
 #include "base/parallel.h"
 #include "image/filter.h"
 #include "reconstruct/labelled_scene.h"
+#include "reconstruct/support_doubt.h"
 #include "reconstruct/tiny_world.h"
 #include "trace/accel.h"
 
@@ -10,12 +11,6 @@
 
 namespace vitrine {
 namespace {
-
-ScanOptions kept_poses() {
-    ScanOptions options;
-    options.poses = PoseMode::Keep;
-    return options;
-}
 
 TEST(Candidates, NoneAmongDiffuseThings) {
     TinyWorldOptions options;
@@ -60,11 +55,7 @@ TEST(Candidates, FindsTheOneObjectWhoseDepthLies) {
 }
 
 TEST(Candidates, AnEditedSilhouetteWins) {
-    TinyWorldOptions small;
-    small.views = 6;
-    small.width = 160;
-    small.height = 120;
-    const TinyWorld world = make_tiny_world(small);
+    const TinyWorld world = make_tiny_world(small_tiny_world());
     const Scan scan = make_scan(world.capture, kept_poses());
     CandidateOptions options;
     options.hull_spacing_m = 0.004;
@@ -76,14 +67,63 @@ TEST(Candidates, AnEditedSilhouetteWins) {
               1.0);
     options.edited_silhouettes[{"object_0", "000002"}] = Mask(5, 5);
     EXPECT_THROW(find_candidates(world.capture, scan, options), InputError);
+    options.edited_silhouettes.clear();
+    options.edited_silhouettes[{"object_7", "000002"}] = world.liar_masks[2];
+    try {
+        find_candidates(world.capture, scan, options);
+        FAIL() << "an edit of nothing was taken";
+    } catch (const InputError& error) {
+        EXPECT_NE(std::string(error.what()).find("one of object_0"), std::string::npos);
+    }
+}
+
+TEST(Candidates, ABoxMakesOneAndReplacesWhatWasFoundInIt) {
+    const TinyWorld world = make_tiny_world(small_tiny_world());
+    const Scan scan = make_scan(world.capture, kept_poses());
+    CandidateOptions options;
+    options.hull_spacing_m = 0.004;
+    Box3 ball, painted, nowhere;
+    ball.extend(Vec3(-0.05, -0.05, 0.0));
+    ball.extend(Vec3(0.05, 0.05, 0.09));
+    painted.extend(Vec3(-0.18, -0.22, 0.0));  // around the flat box, whose depth is right
+    painted.extend(Vec3(-0.06, -0.10, 0.06));
+    nowhere.extend(Vec3(7, 7, 0.0));
+    nowhere.extend(Vec3(7.1, 7.1, 0.1));
+    options.boxes = {ball, painted, nowhere};
+    const Candidates candidates = find_candidates(world.capture, scan, options);
+    ASSERT_EQ(candidates.objects.size(), 2u);
+    EXPECT_LT((candidates.objects[0].box.centre() - Vec3(0, 0, 0.04)).norm(), 0.01);
+    EXPECT_LT((candidates.objects[1].box.centre() - Vec3(-0.12, -0.16, 0.025)).norm(), 0.02);
+    ASSERT_EQ(candidates.notes.size(), 1u);
+    EXPECT_NE(candidates.notes[0].find("(7.050, 7.050, 0.050)"), std::string::npos);
+}
+
+TEST(SupportDoubt, MeasuresTheTableThatGivesNoDepth) {
+    TinyWorldOptions options = small_tiny_world();
+    options.has_liar = false;
+    TinyWorld world = make_tiny_world(options);
+    const auto doubt_of = [](const Capture& capture) {
+        const Scan scan = make_scan(capture, kept_poses());
+        return doubt_support(make_scene_views(capture, scan, {}, 2.0), 3, 0.6);
+    };
+    const SupportDoubt none = doubt_of(world.capture);
+    EXPECT_GT(none.seen_m2, 0.1);
+    EXPECT_LT(none.doubtful_m2, 0.002);
+    for (RgbdFrame& frame : world.capture.frames) {
+        for (int y = 0; y < frame.depth_m.height(); ++y) {
+            for (int x = 0; x < frame.depth_m.width(); ++x) {
+                const Vec3 p = frame.camera.unproject(x, y, frame.depth_m(x, y));
+                if (std::hypot(p.x() + 0.02, p.y() - 0.03) < 0.08 && p.z() < 0.004) {
+                    frame.depth_m(x, y) = 0;
+                }
+            }
+        }
+    }
+    EXPECT_NEAR(doubt_of(world.capture).doubtful_m2, kPi * 0.08 * 0.08, 0.006);
 }
 
 TEST(Candidates, SameBitsForAnyThreadCount) {
-    TinyWorldOptions small;
-    small.views = 6;
-    small.width = 160;
-    small.height = 120;
-    const TinyWorld world = make_tiny_world(small);
+    const TinyWorld world = make_tiny_world(small_tiny_world());
     CandidateOptions options;
     options.hull_spacing_m = 0.003;
     std::vector<Vec3f> first;

@@ -2,6 +2,7 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "capture/exposure_gains.h"
 #include "image/filter.h"
 #include "reconstruct/scan.h"
 
@@ -49,13 +50,13 @@ bool depth_normal(const RgbdFrame& frame, int x, int y, Vec3& normal) {
     return normal.allFinite();
 }
 
-Level prepare(const RgbdFrame& frame, const Mask* excluded, double saturation_level, double blur_px,
-              int samples) {
+Level prepare(const RgbdFrame& frame, const Mask* excluded, double saturation_level, double gain,
+              double blur_px, int samples) {
     Level level;
     const int width = frame.colour.width(), height = frame.colour.height();
     ImageF raw(width, height);
     for (std::size_t i = 0; i < raw.size(); ++i) {
-        raw[i] = std::sqrt(std::max(0.0f, luminance(frame.colour[i])));
+        raw[i] = std::sqrt(std::max(0.0f, luminance(frame.colour[i]) / static_cast<float>(gain)));
     }
     level.luminance = gaussian_blur(raw, blur_px);
     const int step = std::max(1, static_cast<int>(std::sqrt(double(width) * height / samples)));
@@ -166,6 +167,7 @@ struct Problem {
     std::span<const Mask> excluded;
     std::vector<std::pair<std::size_t, std::size_t>> pairs;
     std::vector<Level> levels;
+    std::vector<double> gain;  ///< of each frame's exposure
     double noise_scale = 1.0;
 
     const Mask* excluded_of(std::size_t i) const {
@@ -262,7 +264,12 @@ PoseRefinement refine_poses(const Capture& capture, const std::vector<Camera>& s
     PoseRefinement result;
     result.cameras = start;
     if (start.size() < 2) return result;
-    Problem problem{&capture, excluded, choose_pairs(start, options.max_partners), {}, 1.0};
+    Problem problem{&capture,
+                    excluded,
+                    choose_pairs(start, options.max_partners),
+                    {},
+                    estimate_exposure_gains(capture, start, excluded).gain,
+                    1.0};
     std::vector<Camera> cameras = start;
     for (std::size_t level = 0; level < options.blur_px.size(); ++level) {
         progress.update(double(level) / double(options.blur_px.size()), "refining poses");
@@ -272,7 +279,7 @@ PoseRefinement refine_poses(const Capture& capture, const std::vector<Camera>& s
         parallel_for(start.size(), 1, [&](std::size_t i) {
             problem.levels[i] =
                 prepare(capture.frames[i], problem.excluded_of(i), capture.saturation_level,
-                        options.blur_px[level], options.samples_per_frame);
+                        problem.gain[i], options.blur_px[level], options.samples_per_frame);
         });
         descend(problem, options.steps_per_level, cameras);
     }

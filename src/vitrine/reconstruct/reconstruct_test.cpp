@@ -7,12 +7,6 @@
 namespace vitrine {
 namespace {
 
-ScanOptions kept_poses() {
-    ScanOptions options;
-    options.poses = PoseMode::Keep;
-    return options;
-}
-
 TEST(Scan, FindsTheTableAndItsColours) {
     TinyWorldOptions options;
     options.has_liar = false;

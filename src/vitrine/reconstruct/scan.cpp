@@ -2,6 +2,9 @@
 
 #include "base/log.h"
 #include "base/parallel.h"
+#include "base/text.h"
+#include "capture/exposure_gains.h"
+#include "capture/read_capture.h"
 #include "image/filter.h"
 #include "math/statistics.h"
 #include "reconstruct/appearance.h"
@@ -12,12 +15,15 @@
 #include "trace/depth_map.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace vitrine {
 namespace {
 
 constexpr std::size_t kMaxRefinedFrames = 300;  // one dense system of six unknowns a frame
 constexpr double kMaxDisagreement = 1.0;        // robust cost per comparison; noise alone gives 0.3
+constexpr double kMinTrackedShare = 0.6;        // fewer frames are another capture
+constexpr std::size_t kMinTracked = 5;
 constexpr int kBadMargin_px = 3;  // silhouettes are a little wider than their bad depth
 
 std::vector<ImageF> depth_images(const Capture& capture) {
@@ -45,11 +51,10 @@ Mesh fuse_twice(const std::vector<ImageF>& depth, const std::vector<Camera>& cam
     return fuse_depth(trusted, cameras, options);
 }
 
-/// The plane that most depth pixels lie on, its normal towards the cameras.
-Plane find_support_plane(const Capture& capture, const std::vector<Camera>& cameras,
-                         double max_depth_m) {
+/// Depth pixels of all views as points, thinned out.
+std::vector<Vec3> sample_points(const Capture& capture, const std::vector<Camera>& cameras,
+                                double max_depth_m) {
     std::vector<Vec3> points;
-    Vec3 eye = Vec3::Zero();
     for (std::size_t i = 0; i < cameras.size(); ++i) {
         const ImageF& depth = capture.frames[i].depth_m;
         for (int y = 0; y < depth.height(); y += 4) {
@@ -58,7 +63,6 @@ Plane find_support_plane(const Capture& capture, const std::vector<Camera>& came
                 if (z > 0 && z < max_depth_m) points.push_back(cameras[i].unproject(x, y, z));
             }
         }
-        eye += cameras[i].centre_in_world() / double(cameras.size());
     }
     if (points.size() < 100) {
         throw InputError(
@@ -66,10 +70,41 @@ Plane find_support_plane(const Capture& capture, const std::vector<Camera>& came
              fmt::format("{} usable depth pixels", 16 * points.size()),
              "check depth_scale in capture.json (5000 for TUM, 1000 for millimetres)"});
     }
+    return points;
+}
+
+/// The plane that carries things: of the largest planes, one that faces up rather than a wall. Up
+/// is what the cameras take for up: nobody films a table lying on the side.
+Plane find_support_plane(const Capture& capture, const std::vector<Camera>& cameras,
+                         double max_depth_m) {
+    constexpr int kPlanes = 4;
+    constexpr double kMinShare = 0.03;  // of the points: smaller ones carry nothing
+    std::vector<Vec3> points = sample_points(capture, cameras, max_depth_m);
+    Vec3 eye = Vec3::Zero(), up = Vec3::Zero();
+    for (const Camera& camera : cameras) {
+        eye += camera.centre_in_world() / double(cameras.size());
+        // A camera that looks down sees the table's normal half in its -y, half in its -z.
+        up -= camera.cam_from_world.rotation.transpose() * Vec3(0, 1, 0.5);
+    }
+    up.normalize();
     const double tolerance = 2.5 * depth_noise_m(0.5 * max_depth_m);
-    Plane plane = fit_plane(points, tolerance).plane;
-    if (plane.height(eye) < 0) plane = {-plane.normal, -plane.offset_m};
-    return plane;
+    const std::size_t all = points.size();
+    Plane best;
+    double best_score = -1;
+    for (int k = 0; k < kPlanes && points.size() >= 100; ++k) {
+        Plane plane = fit_plane(points, tolerance).plane;
+        if (plane.height(eye) < 0) plane = {-plane.normal, -plane.offset_m};
+        const std::size_t before = points.size();
+        std::erase_if(points, [&](const Vec3& p) { return std::abs(plane.height(p)) < tolerance; });
+        const double share = double(before - points.size()) / double(all);
+        if (k > 0 && share < kMinShare) break;
+        const double score = share * (0.05 + std::max(0.0, plane.normal.dot(up)));
+        if (score > best_score) {
+            best_score = score;
+            best = plane;
+        }
+    }
+    return best;
 }
 
 double depth_residual(const Capture& capture, const std::vector<ImageF>& model,
@@ -87,31 +122,41 @@ double depth_residual(const Capture& capture, const std::vector<ImageF>& model,
     return all.empty() ? 0.0 : robust_sd(all);
 }
 
-std::vector<Camera> cameras_of(const Capture& capture) {
-    std::vector<Camera> cameras;
-    for (const RgbdFrame& frame : capture.frames) cameras.push_back(frame.camera);
-    return cameras;
-}
-
 /// Finds the poses from the frames.
-/// @throws InputError naming the frames that do not connect to the others
+/// @throws InputError naming the frames that do not connect to the others, when too few do
 void track(const Capture& capture, const Progress& progress, Scan& scan) {
     const Tracking tracking = track_poses(capture, {}, progress);
-    std::string lost;
-    std::size_t lost_count = 0;
+    std::vector<std::size_t> kept;
     for (std::size_t i = 0; i < tracking.is_tracked.size(); ++i) {
-        if (tracking.is_tracked[i]) continue;
-        ++lost_count;
-        if (lost_count <= 10) lost += (lost.empty() ? "" : ", ") + capture.frames[i].id;
+        if (tracking.is_tracked[i]) {
+            kept.push_back(i);
+        } else {
+            scan.dropped.push_back(capture.frames[i].id);
+        }
     }
-    if (lost_count > 0) {
-        throw InputError({capture.name, "frames that share enough texture to find their poses",
-                          fmt::format("{} of {} frames without a connection to the first: {}",
-                                      lost_count, capture.frames.size(), lost),
-                          "take more views between them, add texture, or give a trajectory"});
+    const std::size_t all = capture.frames.size();
+    const bool has_enough =
+        kept.size() >= kMinTracked && double(kept.size()) >= kMinTrackedShare * double(all);
+    if (!scan.dropped.empty() && !has_enough) {
+        const std::size_t shown = std::min<std::size_t>(10, scan.dropped.size());
+        throw InputError(
+            {capture.name, "frames that share enough texture to find their poses",
+             fmt::format("{} of {} frames without a connection to the others: {}{}",
+                         scan.dropped.size(), all, join(std::span(scan.dropped).first(shown), ", "),
+                         shown < scan.dropped.size() ? ", ..." : ""),
+             "take more views between them, add texture, or give a trajectory"});
     }
-    scan.cameras = tracking.cameras;
+    scan.cameras.clear();
+    scan.poses.clear();
+    for (const std::size_t i : kept) {
+        scan.cameras.push_back(tracking.cameras[i]);
+        scan.poses.push_back({.id = capture.frames[i].id});
+    }
     scan.notes.push_back("poses found from the frames alone");
+    if (scan.dropped.empty()) return;
+    scan.notes.push_back(fmt::format("{} of {} frames dropped, no connection to the others: {}",
+                                     scan.dropped.size(), all, join(scan.dropped, ", ")));
+    log_warning("{}", scan.notes.back());
 }
 
 /// Turns the world so that the support plane is z = 0 and up is +z.
@@ -127,8 +172,7 @@ void set_upright(Scan& scan) {
 void refine(const Capture& capture, const Progress& progress, Scan& scan) {
     if (scan.cameras.size() > kMaxRefinedFrames) {
         scan.notes.push_back(
-            fmt::format("poses kept: {} frames are more than the {} that are "
-                        "refined together",
+            fmt::format("poses kept: {} frames are more than the {} that are refined together",
                         scan.cameras.size(), kMaxRefinedFrames));
         return;
     }
@@ -155,20 +199,63 @@ void refine(const Capture& capture, const Progress& progress, Scan& scan) {
             : "poses kept: refining them would not make the views agree better");
 }
 
+/// Writes down how much brighter each frame is than the others, if that is sure.
+bool find_exposures(const Capture& capture, Scan& scan) {
+    const ExposureGains gains = estimate_exposure_gains(capture, scan.cameras);
+    if (!gains.is_significant) return false;
+    for (std::size_t i = 0; i < gains.gain.size(); ++i) scan.poses[i].exposure_gain = gains.gain[i];
+    const auto [low, high] = std::minmax_element(gains.gain.begin(), gains.gain.end());
+    scan.notes.push_back(
+        fmt::format("exposures evened out: gains of {:.2f} to {:.2f}, disagreement in brightness "
+                    "{:.1f} % -> {:.1f} %",
+                    *low, *high, 100 * gains.disagreement_before, 100 * gains.disagreement_after));
+    return true;
+}
+
 }  // namespace
 
-Scan make_scan(const Capture& capture, const ScanOptions& options, const Progress& progress) {
-    if (capture.frames.empty()) {
-        throw InputError({capture.name, "at least one frame", "none", ""});
+Capture frames_of_scan(Capture capture, const Scan& scan) {
+    std::vector<RgbdFrame> frames;
+    std::vector<double> gain;
+    for (RgbdFrame& frame : capture.frames) {
+        const std::size_t k = frames.size();
+        if (k >= scan.poses.size() || scan.poses[k].id != frame.id) continue;
+        gain.push_back(scan.poses[k].exposure_gain);
+        frames.push_back(std::move(frame));
+    }
+    VITRINE_CHECK_EQ(frames.size(), scan.poses.size());
+    capture.frames = std::move(frames);
+    const auto is_reference = [&](const RgbdFrame& frame) {
+        return frame.id == capture.reference_albedo->frame;
+    };
+    if (capture.reference_albedo &&
+        std::none_of(capture.frames.begin(), capture.frames.end(), is_reference)) {
+        capture.warnings.push_back("the frame of the reference albedo has no pose: it is not used");
+        capture.reference_albedo.reset();
+    }
+    if (std::any_of(gain.begin(), gain.end(), [](double g) { return g != 1.0; })) {
+        apply_exposure_gains(gain, capture);
+    }
+    return capture;
+}
+
+Scan make_scan(const Capture& given, const ScanOptions& options, const Progress& progress) {
+    if (given.frames.empty()) {
+        throw InputError({given.name, "at least one frame", "none", ""});
     }
     Scan scan;
-    scan.cameras = cameras_of(capture);
-    for (const RgbdFrame& frame : capture.frames) scan.poses.push_back({.id = frame.id});
-    const bool has_start = capture.has_poses && options.poses != PoseMode::Track;
-    if (!has_start) track(capture, progress.part(0.0, 0.15), scan);
+    scan.cameras = cameras_of(given);
+    for (const RgbdFrame& frame : given.frames) scan.poses.push_back({.id = frame.id});
+    std::optional<Capture> changed;  // a copy only when the frames do not stay as they came
+    const auto now = [&]() -> const Capture& { return changed ? *changed : given; };
+    const bool has_start = given.has_poses && options.poses != PoseMode::Track;
+    if (!has_start) track(given, progress.part(0.0, 0.15), scan);
+    if (!scan.dropped.empty()) changed = frames_of_scan(given, scan);
     if (!has_start || options.poses == PoseMode::Refine) {
-        refine(capture, progress.part(0.15, 0.3), scan);
+        refine(now(), progress.part(0.15, 0.3), scan);
     }
+    if (find_exposures(now(), scan)) changed = frames_of_scan(given, scan);
+    const Capture& capture = now();
     const FusionOptions fusion{options.voxel_m, options.truncation_m, options.max_depth_m};
     scan.support_plane = find_support_plane(capture, scan.cameras, options.max_depth_m);
     if (!has_start) set_upright(scan);

@@ -28,25 +28,32 @@ struct ScanOptions {
 /// What happened to one frame's pose.
 struct FramePose {
     std::string id;
-    bool is_tracked = true;   ///< false: no reliable pose; the frame is left out
-    double moved_m = 0.0;     ///< distance from the pose that came in
-    double turned_rad = 0.0;  ///< rotation from the pose that came in
-    double residual_m = 0.0;  ///< robust sd of depth against the fused surface
+    double moved_m = 0.0;        ///< distance from the pose that came in
+    double turned_rad = 0.0;     ///< rotation from the pose that came in
+    double residual_m = 0.0;     ///< robust sd of depth against the fused surface
+    double exposure_gain = 1.0;  ///< how much brighter the frame is than the others
 };
 
 struct Scan {
-    Mesh mesh;                    ///< fused surface in the world; colours = median linear radiance
-    std::vector<Camera> cameras;  ///< one per frame of the capture, in its order
-    Plane support_plane;          ///< carries the objects; the normal points up, to the cameras
-    std::vector<FramePose> poses;
-    double depth_residual_m = 0.0;   ///< robust sd of measured depth against the mesh
-    std::vector<std::string> notes;  ///< plain sentences for the report
+    Mesh mesh;                     ///< fused surface in the world; colours = median linear radiance
+    std::vector<Camera> cameras;   ///< one per frame that has a pose, in the capture's order
+    Plane support_plane;           ///< carries the objects; the normal points up, to the cameras
+    std::vector<FramePose> poses;  ///< one per camera
+    std::vector<std::string> dropped;  ///< ids of frames whose pose could not be found
+    double depth_residual_m = 0.0;     ///< robust sd of measured depth against the mesh
+    std::vector<std::string> notes;    ///< plain sentences for the report
 };
 
+/// Without poses: frames that do not connect to the others are dropped and named as long as enough
+/// remain (at least 60 % and five).
 /// Cost: about 0.4 s a 640x360 frame on two cores.
-/// @throws InputError when there is no usable depth, or poses are asked for that do not exist.
+/// @throws InputError when there is no usable depth, or too few frames find their pose.
 Scan make_scan(const Capture& capture, const ScanOptions& options = {},
                const Progress& progress = {});
+
+/// The capture as the scan knows it: dropped frames left out, exposures evened out. What comes
+/// after the scan works on this, frame by camera.
+Capture frames_of_scan(Capture capture, const Scan& scan);
 
 /// Standard deviation of a structured-light or time-of-flight depth reading at planar depth z
 /// (Nguyen, Izadi, Lovell 2012, axial noise of a Kinect).

@@ -3,6 +3,7 @@
 
 #include "capture/capture.h"
 #include "geometry/mesh.h"
+#include "reconstruct/scan.h"
 
 #include <memory>
 #include <vector>
@@ -27,5 +28,21 @@ struct TinyWorld {
 /// poses. Shading is a texture fixed to the surfaces; the liar shows a pattern that turns with the
 /// view.
 TinyWorld make_tiny_world(const TinyWorldOptions& options = {});
+
+/// Six coarse views: enough for what does not ask for accuracy.
+inline TinyWorldOptions small_tiny_world() {
+    TinyWorldOptions options;
+    options.views = 6;
+    options.width = 160;
+    options.height = 120;
+    return options;
+}
+
+/// The world's poses are exact.
+inline ScanOptions kept_poses() {
+    ScanOptions options;
+    options.poses = PoseMode::Keep;
+    return options;
+}
 
 }  // namespace vitrine

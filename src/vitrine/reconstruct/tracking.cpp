@@ -3,6 +3,7 @@
 #include "base/log.h"
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "capture/read_capture.h"
 #include "reconstruct/scan.h"
 
 #include <opencv2/core.hpp>
@@ -172,6 +173,38 @@ std::vector<Link> pairs_to_try(std::size_t count, std::size_t all_pairs_up_to) {
     return links;
 }
 
+/// Prim's algorithm from one frame: the strongest link that leaves the tree, again and again.
+Tracking grow_tree(const Capture& capture, const std::vector<Link>& links, std::size_t root,
+                   int min_inliers) {
+    const std::size_t count = capture.frames.size();
+    Tracking tracking;
+    tracking.cameras = cameras_of(capture);
+    tracking.is_tracked.assign(count, false);
+    tracking.inliers.assign(count, 0);
+    tracking.is_tracked[root] = true;
+    tracking.cameras[root].cam_from_world = Rigid3();
+    for (std::size_t placed = 1; placed < count; ++placed) {
+        const Link* best = nullptr;
+        for (const Link& link : links) {
+            if (tracking.is_tracked[link.a] == tracking.is_tracked[link.b]) continue;
+            if (link.inliers >= min_inliers && (!best || link.inliers > best->inliers)) {
+                best = &link;
+            }
+        }
+        if (!best) break;
+        const bool is_forward = tracking.is_tracked[best->a];
+        const std::size_t known = is_forward ? best->a : best->b;
+        const std::size_t fresh = is_forward ? best->b : best->a;
+        const Rigid3 step = is_forward ? best->b_from_a : best->b_from_a.inverse();
+        tracking.cameras[fresh].cam_from_world = step * tracking.cameras[known].cam_from_world;
+        tracking.is_tracked[fresh] = true;
+        tracking.inliers[fresh] = best->inliers;
+        log_debug("tracking: frame {} from {} by {} points", capture.frames[fresh].id,
+                  capture.frames[known].id, best->inliers);
+    }
+    return tracking;
+}
+
 }  // namespace
 
 Tracking track_poses(const Capture& capture, const TrackingOptions& options,
@@ -188,33 +221,23 @@ Tracking track_poses(const Capture& capture, const TrackingOptions& options,
     parallel_for(links.size(), 1, [&](std::size_t k) {
         links[k] = connect(features[links[k].a], features[links[k].b], links[k], options.trials);
     });
-    Tracking tracking;
-    for (const RgbdFrame& frame : capture.frames) tracking.cameras.push_back(frame.camera);
-    tracking.is_tracked.assign(count, false);
-    tracking.inliers.assign(count, 0);
-    tracking.is_tracked[0] = true;
-    tracking.cameras[0].cam_from_world = Rigid3();
-    // Prim's algorithm: the strongest link that leaves the tree, again and again.
-    for (std::size_t placed = 1; placed < count; ++placed) {
-        const Link* best = nullptr;
-        for (const Link& link : links) {
-            if (tracking.is_tracked[link.a] == tracking.is_tracked[link.b]) continue;
-            if (link.inliers >= options.min_inliers && (!best || link.inliers > best->inliers)) {
-                best = &link;
-            }
+    Tracking best;
+    std::size_t most = 0;
+    std::vector<bool> is_seen(count, false);
+    for (std::size_t root = 0; root < count; ++root) {
+        if (is_seen[root]) continue;
+        Tracking tracking = grow_tree(capture, links, root, options.min_inliers);
+        std::size_t size = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            size += tracking.is_tracked[i] ? 1 : 0;
+            is_seen[i] = is_seen[i] || tracking.is_tracked[i];
         }
-        if (!best) break;
-        const bool is_forward = tracking.is_tracked[best->a];
-        const std::size_t known = is_forward ? best->a : best->b;
-        const std::size_t fresh = is_forward ? best->b : best->a;
-        const Rigid3 step = is_forward ? best->b_from_a : best->b_from_a.inverse();
-        tracking.cameras[fresh].cam_from_world = step * tracking.cameras[known].cam_from_world;
-        tracking.is_tracked[fresh] = true;
-        tracking.inliers[fresh] = best->inliers;
-        log_debug("tracking: frame {} from {} by {} points", capture.frames[fresh].id,
-                  capture.frames[known].id, best->inliers);
+        if (size > most) {
+            most = size;
+            best = std::move(tracking);
+        }
     }
-    return tracking;
+    return best;
 }
 
 }  // namespace vitrine

@@ -15,16 +15,17 @@ struct TrackingOptions {
 };
 
 struct Tracking {
-    std::vector<Camera> cameras;   ///< in the frame of the first; only tracked ones mean something
-    std::vector<bool> is_tracked;  ///< connected to the first frame
+    std::vector<Camera>
+        cameras;  ///< in the frame of the first tracked one; only tracked ones count
+    std::vector<bool> is_tracked;  ///< in the largest group of connected frames
     std::vector<int> inliers;      ///< of the connection that placed the frame
 };
 
 /// SIFT features with depth, matched between pairs of views, rigid motions by RANSAC on three
 /// points; the frames hang on the tree of the strongest connections (maximum spanning tree), so a
-/// weak step is bridged by a better detour. Not yet refined. Deterministic.
-/// Works while neighbouring views differ by less than about 30 degrees on a textured scene.
-/// Cost: 0.1 s a frame and 0.1 s a pair.
+/// weak step is bridged by a better detour. Frames outside the largest connected group have no
+/// pose. Not yet refined. Deterministic. Works while neighbouring views differ by less than about
+/// 30 degrees on a textured scene. Cost: 0.1 s a frame and 0.1 s a pair.
 Tracking track_poses(const Capture& capture, const TrackingOptions& options = {},
                      const Progress& progress = {});
 
