@@ -212,8 +212,8 @@ class InsertionRun {
              method_identity()},
             [&] {
                 SceneEstimate first;
-                first.light = estimate_first_light(scene_, capture_, estimate_options(),
-                                                   progress_("lights"));
+                first.light =
+                    estimate_first_light(scene_, capture_, estimate_options(), progress_("lights"));
                 first.method = options_.method;
                 write_estimate(workspace_.path("30_lights.json"), first);
             },

@@ -133,19 +133,6 @@ TEST(Tracking, GoesOnWithoutTheFramesThatDoNotConnect) {
     EXPECT_THROW(make_scan(capture), InputError);  // three are left: another capture
 }
 
-TEST(Tracking, FollowsAVideo) {
-    TinyWorldOptions options;
-    options.views = 48;
-    options.arc_deg = 72;
-    TinyWorld world = make_tiny_world(options);
-    const Capture truth = world.capture;
-    for (RgbdFrame& frame : world.capture.frames) frame.camera.cam_from_world = Rigid3();
-    world.capture.has_poses = false;
-    const Scan scan = make_scan(world.capture);
-    EXPECT_TRUE(scan.dropped.empty());
-    EXPECT_LT(worst_shift(scan.cameras, truth), 0.005);
-}
-
 TEST(Tracking, FindsPosesOfTexturedViews) {
     Capture truth;
     const Capture capture = textured_views(4, 30, truth);
