@@ -20,18 +20,18 @@ struct Outline {
 };
 
 struct OutlineOptions {
-    double min_thickness_m = 0.02;  ///< thinner streaks without depth are shadows of depth edges
-    double max_island_m = 0.08;     ///< readings through an opening, inside the region
-    double min_size_m = 0.02;       ///< square root of the region's area
+    double min_thickness_m = 0.016;  ///< thinner streaks without depth are shadows of depth edges
+    double max_island_m = 0.08;      ///< readings through an opening, inside the region
+    double min_size_m = 0.02;        ///< square root of the region's area
     double max_size_m = 0.35;
     double min_rim_on_plane = 0.4;  ///< share of the lower rim's readings that lie on the plane
 };
 
-/// Regions without depth, thick and compact, whose lower rim lies on the support plane; regions of
-/// two things that touch are cut where their contour is pinched; outlines by minimum cut with
-/// colour and depth (silhouette_cut.h) started from the region's convex hull.
-/// Dark or oblique things without depth look the same in one view: each outline says so.
-/// Cost: about 1 s for 1280x720.
+/// Figures that edges of colour draw on the support plane (figures.h) and that hold missing depth,
+/// and missing depth beside them that is no shadow of the sensor; their outlines by minimum cut
+/// with colour and depth (silhouette_cut.h); what touches is cut in two where its contour is
+/// pinched. Dark or oblique things without depth look the same in one view: each outline says so.
+/// Cost: about 2 s for 1280x720.
 std::vector<Outline> find_outlines(const RgbdFrame& frame, const Camera& camera,
                                    const Plane& support, double saturation_level,
                                    const OutlineOptions& options = {});
