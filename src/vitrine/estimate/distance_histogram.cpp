@@ -77,6 +77,16 @@ DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
     for (int k = 0; nodes_.empty() || nodes_.back() < reach; ++k)
         nodes_.push_back(step_ * kFirst / kGrowth * (std::exp(kGrowth * k) - 1));
 
+    // The node below a distance, looked up: a logarithm per pair would be a third of the work.
+    const double lookup_step = 0.5 * (nodes_[1] - nodes_[0]);
+    std::vector<std::uint32_t> node_below;
+    for (std::uint32_t k = 0; nodes_[k] < reach;) {
+        const double r = lookup_step * static_cast<double>(node_below.size());
+        while (k + 2 < nodes_.size() && nodes_[k + 1] <= r) ++k;
+        node_below.push_back(k);
+        if (r >= reach) break;
+    }
+
     const std::size_t fields = static_cast<std::size_t>(field_count_);
     const Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> values =
         source_values;
@@ -93,8 +103,9 @@ DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
         for (std::size_t i = 0; i < samples.position.size(); ++i) {
             if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
             const double r = (samples.position[i] - observations.position[p]).norm();
-            const double place = std::log1p(r * kGrowth / (step_ * kFirst)) / kGrowth;
-            const std::size_t k = std::min(static_cast<std::size_t>(place), nodes_.size() - 2);
+            std::size_t k = node_below[std::min(static_cast<std::size_t>(r / lookup_step),
+                                                node_below.size() - 1)];
+            if (k + 2 < nodes_.size() && nodes_[k + 1] <= r) ++k;  // half a step at most
             const auto t = static_cast<float>(
                 std::clamp((r - nodes_[k]) / (nodes_[k + 1] - nodes_[k]), 0.0, 1.0));
             Eigen::Map<Eigen::RowVectorXf> lower(block + k * fields, field_count_);

@@ -44,20 +44,24 @@ class Fit {
             weight_.col(c) = y_.col(c).cwiseMax(kDarkest).cwiseInverse();
         }
         base_weight_ = weight_;
-        set_bodies(RgbExponentials{single_exponential(1), single_exponential(1),
-                                   single_exponential(1)});
+        set_bodies(
+            RgbExponentials{single_exponential(1), single_exponential(1), single_exponential(1)});
     }
 
     /// Kernels and intensities for given directions, from every length as a start.
     FewLamps fit_kernels(const std::vector<Vec3>& directions) const {
         const LightFields fields = object_.fields(directions, true);
+        // All channels at once: they differ in how the closed body weighs the same distances.
+        const Index count = fields.source.cols();
+        const DistanceHistogram histogram(
+            object_.observations(), object_.samples(), fields.source.replicate(1, kChannels),
+            fields.local.replicate(1, kChannels), repeated_bodies(static_cast<std::size_t>(count)));
         std::array<LengthImages, kChannels> images;
-        for (int c = 0; c < kChannels; ++c) {
-            const DistanceHistogram histogram(object_.observations(), object_.samples(),
-                                              fields.source, fields.local, {body_[c]});
-            for (const double length : lengths_) {
-                images[c].push_back(
-                    histogram.image_of([length](double r) { return std::exp(-r / length); }));
+        for (const double length : lengths_) {
+            const MatrixXd all =
+                histogram.image_of([length](double r) { return std::exp(-r / length); });
+            for (int c = 0; c < kChannels; ++c) {
+                images[c].push_back(all.middleCols(c * count, count));
                 images[c].back().rightCols<1>() *= ground_colour_[c];
             }
         }
@@ -84,9 +88,9 @@ class Fit {
             if (mean_[c] <= 0) continue;
             const VectorXd residual =
                 base_weight_.col(c).cwiseProduct(images[c] * lamps.intensity - y_.col(c));
-            const double bend = 1.5 * std::max(1e-6, robust_sd(std::vector<double>(
-                                                         residual.data(),
-                                                         residual.data() + residual.size())));
+            const double bend =
+                1.5 * std::max(1e-6, robust_sd(std::vector<double>(
+                                         residual.data(), residual.data() + residual.size())));
             for (Index i = 0; i < residual.size(); ++i) {
                 const double size = std::abs(residual[i]);
                 if (size > bend) weight_(i, c) *= std::sqrt(bend / size);
@@ -162,6 +166,13 @@ class Fit {
     }
 
   private:
+    /// Of each channel, for `count` fields.
+    std::vector<CurvedBodyFactor> repeated_bodies(std::size_t count) const {
+        std::vector<CurvedBodyFactor> result;
+        for (const CurvedBodyFactor& body : body_) result.insert(result.end(), count, body);
+        return result;
+    }
+
     std::array<MatrixXd, kChannels> images_of(const std::array<LengthImages, kChannels>& images,
                                               const RgbExponentials& kernel) const {
         std::array<MatrixXd, kChannels> result;

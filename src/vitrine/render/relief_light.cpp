@@ -29,8 +29,9 @@ bool is_hidden_by_relief(const Relief& relief, float top, const Vec3f& point, co
     for (int k = 1; k < 200; ++k) {
         const Vec3f p = start + (static_cast<float>(k) * step / std::max(flat, 0.2f)) * direction;
         if (std::abs(p.z()) > top) return false;
-        const int x = static_cast<int>(std::lround(p.x()));
-        const int y = static_cast<int>(std::lround(-p.y()));
+        if (p.x() < -0.5f || p.y() > 0.5f) return false;  // what follows rounds positive numbers
+        const int x = static_cast<int>(p.x() + 0.5f);
+        const int y = static_cast<int>(0.5f - p.y());
         if (!relief.mask.contains(x, y)) return false;
         if (is_inside(relief.mask, x, y) && p.z() < relief.depth_px(x, y) &&
             p.z() > relief.back_px(x, y)) {
