@@ -314,12 +314,8 @@ class InsertionRun {
 
         const Scene real = read_scene(workspace_.path("40_scene/scene.json"));
         DifferentialOptions render;
+        if (options_.quality == RenderQuality::Preview) render = preview_options();
         render.seed = options_.seed;
-        if (options_.quality == RenderQuality::Preview) {
-            render.min_samples = 8;
-            render.max_samples = 32;
-            render.photon_count = 500'000;
-        }
         if (options_.photon_count > 0) render.photon_count = options_.photon_count;
         std::vector<Camera> cameras;
         for (const std::size_t i : frames) cameras.push_back(labelled.cameras[i]);

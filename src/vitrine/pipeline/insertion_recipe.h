@@ -15,7 +15,7 @@ namespace vitrine {
 enum class InsertionStage { Reconstruct, Candidates, Lights, Materials, Insert, Report };
 
 enum class RenderQuality {
-    Preview,  ///< noise is visible in smooth shadows; seconds per frame
+    Preview,  ///< render/differential.h, preview_options(): one bounce, grain in soft shadows
     Final,
 };
 

@@ -9,9 +9,9 @@ namespace vitrine {
 /// Sizes are in pixels of the picture.
 struct FigureOptions {
     double blur_px = 2.0;
-    int closing_px = 7;      ///< gaps between edges up to twice as wide are closed
-    int opening_px = 12;     ///< lines and bridges up to twice as wide are dropped
-    double min_pixels = 900; ///< smaller figures are dropped
+    int closing_px = 7;       ///< gaps between edges up to twice as wide are closed
+    int opening_px = 12;      ///< lines and bridges up to twice as wide are dropped
+    double min_pixels = 900;  ///< smaller figures are dropped
 };
 
 /// Regions within `where` that are enclosed by edges clearly stronger than those of the bare

@@ -20,8 +20,8 @@ std::vector<Region> regions_of(const Mask& mask, double min_pixels);
 /// The mask without smaller regions.
 Mask without_small_regions(const Mask& mask, double min_pixels);
 
-Mask fill_holes(const Mask& mask);      ///< everything within outer contours
-Mask convex_hull(const Mask& mask);     ///< of all pixels inside; empty when they are fewer than 3
+Mask fill_holes(const Mask& mask);   ///< everything within outer contours
+Mask convex_hull(const Mask& mask);  ///< of all pixels inside; empty when they are fewer than 3
 Mask mask_and(const Mask& a, const Mask& b);
 Mask mask_minus(const Mask& a, const Mask& b);
 

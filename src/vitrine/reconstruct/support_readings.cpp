@@ -66,8 +66,7 @@ SupportReadings read_support(const ImageF& depth_m, const Camera& camera, const 
     result.plane_depth_m = depth_of_plane(camera, support);
     result.classes = classify_depth(depth_m, result.plane_depth_m, camera, kMaxDepth_m);
     const int thick = pixels(0.5 * min_thickness_m), gap = pixels(kSmallGap_m);
-    const Mask hanging =
-        islands(depth_m, gap, std::pow(max_island_m * result.pixels_per_m, 2));
+    const Mask hanging = islands(depth_m, gap, std::pow(max_island_m * result.pixels_per_m, 2));
     result.on_plane = Mask(camera.width, camera.height);
     Mask above = result.on_plane, missing = result.on_plane;
     for (int y = 0; y < camera.height; ++y) {

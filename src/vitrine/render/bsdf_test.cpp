@@ -237,6 +237,70 @@ TEST(Lights, EmittedPowerIsThatOfTheCone) {
     }
 }
 
+TEST(Lights, SpotRaysFillTheConeEvenly) {
+    const Sphere target{Vec3f(0.1f, -0.2f, 0), 0.3f}, scene{Vec3f(0, 0, 0), 2.0f};
+    const Vec3 place(0, 0.3, 1);
+    const LightSampler lights(
+        {SpotLight{place, Vec3(0.1, -0.5, -1).normalized(), Rgb::Constant(2.0f), 70.0}},
+        Rgb::Zero());
+    const Vec3f axis = target.centre - place.cast<float>();
+    const Frame frame(axis.normalized());
+    const double cos_max = std::sqrt(1 - 0.3 * 0.3 / axis.squaredNorm());
+    constexpr std::size_t kRings = 8, kSectors = 12;
+    constexpr std::uint32_t kDraws = 40000;
+    std::vector<double> observed(kRings * kSectors, 0.0);
+    const std::vector<double> expected(observed.size(), double(kDraws) / (kRings * kSectors));
+    Rng rng(17);
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+        const Vec2f u(rng.next_float(), rng.next_float());
+        const Vec3f d = frame.to_local(lights.emit(0, target, u, u, scene).direction);
+        const double ring = (1 - d.z()) / (1 - cos_max), turn = std::atan2(d.y(), d.x()) / kPi;
+        const auto r = std::min(kRings - 1, static_cast<std::size_t>(ring * kRings));
+        const auto k = std::min(kSectors - 1, static_cast<std::size_t>((turn + 1) / 2 * kSectors));
+        observed[r * kSectors + k] += 1;
+    }
+    EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
+}
+
+TEST(Lights, EnvironmentRaysFollowTheMapAndFillTheDisc) {
+    auto map = std::make_shared<ImageRgb>(8, 4);
+    for (int y = 0; y < 4; ++y)
+        for (int x = 0; x < 8; ++x)
+            (*map)(x, y) = Rgb::Constant(static_cast<float>((x * 5 + y * 3) % 7));
+    const LightSampler lights({EnvironmentLight{map, "", 1.0}}, Rgb::Zero());
+    const Sphere target{Vec3f(0.1f, -0.2f, 0.3f), 0.2f}, scene{Vec3f(0, 0, 0), 2.0f};
+    // Texel of the direction, and ring and half of the place on the disc across it.
+    constexpr std::size_t kRings = 4;
+    constexpr std::uint32_t kDraws = 60000;
+    std::vector<double> observed(32 * kRings * 2, 0.0), expected(observed.size(), 0.0);
+    Rng rng(23);
+    for (std::uint32_t i = 0; i < kDraws; ++i) {
+        const Vec2f u(rng.next_float(), rng.next_float()), v(rng.next_float(), rng.next_float());
+        const EmittedRay ray = lights.emit(0, target, u, v, scene);
+        const Vec3f w = -ray.direction;
+        const float phi = std::atan2(w.y(), w.x()) + kPif;
+        const auto y = std::min<std::size_t>(3, std::size_t(std::acos(w.z()) / kPif * 4));
+        const auto x = std::min<std::size_t>(7, std::size_t(phi / (2 * kPif) * 8));
+        const Vec3f to_axis = target.centre - ray.origin;
+        const Vec3f across = to_axis - to_axis.dot(ray.direction) * ray.direction;
+        const float share = across.squaredNorm() / (target.radius * target.radius);
+        const auto ring = std::min(kRings - 1, static_cast<std::size_t>(share * kRings));
+        const std::size_t half = across.dot(Frame(ray.direction).tangent) > 0 ? 1 : 0;
+        observed[((y * 8 + x) * kRings + ring) * 2 + half] += 1;
+    }
+    double sum = 0;
+    for (std::size_t texel = 0; texel < 32; ++texel) {
+        const auto y = static_cast<double>(texel / 8);
+        const double solid_angle = std::cos(kPi * y / 4) - std::cos(kPi * (y + 1) / 4);
+        const double power = luminance((*map)[texel]) * solid_angle;
+        sum += power;
+        for (std::size_t k = 0; k < 2 * kRings; ++k)
+            expected[texel * 2 * kRings + k] = power / (2 * kRings);
+    }
+    for (double& e : expected) e *= kDraws / sum;
+    EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
+}
+
 TEST(Lights, EnvironmentSamplesFollowTheirDensity) {
     auto map = std::make_shared<ImageRgb>(16, 8);
     for (int y = 0; y < 8; ++y) {

@@ -1,6 +1,7 @@
 #include "render/caustics.h"
 
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "geometry/primitives.h"
 #include "math/statistics.h"
 #include "optics/fresnel.h"
@@ -282,6 +283,35 @@ TEST(Media, SmallerBodyDisplacesLarger) {
     media.leave(2);
     media.leave(0);
     EXPECT_EQ(media.current(), Media::kNone);
+}
+
+TEST(CausticMaps, SecondaryLightsAreChosenByTheirFlux) {
+    std::vector<Photon> photons;
+    Rng rng(5);
+    for (int k = 0; k < 40; ++k) {
+        Photon photon;
+        photon.position = Vec3f(0.1f * static_cast<float>(k), 0, 0);  // each a patch of its own
+        photon.normal = PackedDirection(Vec3f(0, 0, 1));
+        photon.power = Rgb(rng.next_float(), rng.next_float(), rng.next_float());
+        photon.set_diffuse_albedo(Rgb::Constant(k % 4 == 0 ? 0.0f : 0.6f));  // some do not reflect
+        photons.push_back(photon);
+    }
+    const CausticMaps maps = build_caustic_maps(photons, 0.001);
+    ASSERT_EQ(maps.secondary.size(), 30u);
+    std::vector<double> observed(30, 0.0), expected(30, 0.0);
+    constexpr int kDraws = 30000;
+    double sum = 0;
+    for (const SecondaryLight& light : maps.secondary) sum += luminance(light.flux);
+    for (std::size_t i = 0; i < 30; ++i) {
+        expected[i] = kDraws * luminance(maps.secondary[i].flux) / sum;
+        EXPECT_NEAR(maps.secondary_choice->probability(i) * kDraws, expected[i],
+                    1e-4 * expected[i]);
+    }
+    for (int k = 0; k < kDraws; ++k) {
+        float u = rng.next_float();
+        observed[maps.secondary_choice->sample(u)] += 1;
+    }
+    EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
 }
 
 }  // namespace
