@@ -67,15 +67,17 @@ double volume_iou(const Mesh& a, const Mesh& b) {
 }
 
 struct SurfaceError {
-    double median_mm, p90_mm, normal_deg;
+    double median_mm, p90_mm, normal_deg, outer_normal_deg;
 };
 
-/// From points of the truth to the hull; normals only on the upper half.
+/// From points of the truth to the hull; normals only on the upper half. Outer normals: where
+/// nothing of the body stands before its surface. The inner wall of a cup faces itself, is in no
+/// silhouette and in no hull.
 SurfaceError surface_error(const Mesh& truth, const Mesh& hull) {
-    const Accel accel = accel_of(hull);
+    const Accel accel = accel_of(hull), body = accel_of(truth);
     const SurfaceSamples samples = sample_surface(truth, 20000, 1);
     const Box3 box = bounds(truth);
-    std::vector<double> distance, angle;
+    std::vector<double> distance, angle, outer;
     for (std::size_t i = 0; i < samples.points.size(); ++i) {
         const Hit near = accel.nearest(samples.points[i], 1.0f);
         if (!near.is_hit()) continue;
@@ -83,8 +85,11 @@ SurfaceError surface_error(const Mesh& truth, const Mesh& hull) {
         if (samples.points[i].z() < box.centre().z()) continue;
         angle.push_back(degrees(angle_between(samples.normals[i].cast<double>(),
                                               shading_normal(hull, near).cast<double>())));
+        const Ray outwards{samples.points[i] + 1e-4f * samples.normals[i], samples.normals[i]};
+        if (!body.closest(outwards).is_hit()) outer.push_back(angle.back());
     }
-    return {median(distance), quantile(distance, 0.9), angle.empty() ? 180.0 : median(angle)};
+    return {median(distance), quantile(distance, 0.9), angle.empty() ? 180.0 : median(angle),
+            outer.empty() ? 180.0 : median(outer)};
 }
 
 /// Frames of truth/hires by the id of the frame that they stand for.
@@ -187,12 +192,13 @@ void report_object(const Capture& capture, const Scan& scan, const Candidate& ca
     std::printf("  %s = %s: silhouette IoU mean %.3f worst %.3f (%d views)\n", candidate.id.c_str(),
                 truth.name.c_str(), sum / views, worst, views);
     std::printf(
-        "    hull: distance median %.2f mm p90 %.2f mm; normals, upper half %.2f deg; "
-        "volume IoU %.3f\n",
-        error.median_mm, error.p90_mm, error.normal_deg, iou);
-    std::printf("    true silhouettes give: %.2f mm, %.2f mm; %.2f deg; %.3f (ratio %.3f)\n",
-                ideal_error.median_mm, ideal_error.p90_mm, ideal_error.normal_deg, ideal_iou,
-                iou / ideal_iou);
+        "    hull: distance median %.2f mm p90 %.2f mm; normals, upper half %.2f deg, of its outer "
+        "surface %.2f deg; volume IoU %.3f\n",
+        error.median_mm, error.p90_mm, error.normal_deg, error.outer_normal_deg, iou);
+    std::printf(
+        "    true silhouettes give: %.2f mm, %.2f mm; %.2f deg, %.2f deg; %.3f (ratio %.3f)\n",
+        ideal_error.median_mm, ideal_error.p90_mm, ideal_error.normal_deg,
+        ideal_error.outer_normal_deg, ideal_iou, iou / ideal_iou);
     std::printf("    revolution %s, outline residual %.2f px; bad depth %.2f; closed %s; %s\n",
                 candidate.revolution.is_found ? "yes" : "no", candidate.outline_residual_px,
                 candidate.bad_depth_fraction,

@@ -3,6 +3,7 @@
 #include "reconstruct/pose_refinement.h"
 #include "reconstruct/scan.h"
 #include "reconstruct/tiny_world.h"
+#include "reconstruct/tracking.h"
 
 #include <gtest/gtest.h>
 
@@ -131,6 +132,41 @@ TEST(Tracking, GoesOnWithoutTheFramesThatDoNotConnect) {
     EXPECT_TRUE(is_said);
     for (const std::size_t i : {1u, 6u}) make_grey(capture.frames[i]);
     EXPECT_THROW(make_scan(capture), InputError);  // three are left: another capture
+}
+
+/// A camera that is carried along an arc: 2.6 degrees a frame, more frames than are compared each
+/// with each. Without loops small steps add up; all poses at once take the drift out.
+TEST(Tracking, FollowsAVideo) {
+    TinyWorldOptions options;
+    options.views = 42;
+    options.arc_deg = 107;
+    options.nod_deg = 0;
+    TinyWorld world = make_tiny_world(options);
+    const Capture truth = world.capture;
+    for (RgbdFrame& frame : world.capture.frames) frame.camera.cam_from_world = Rigid3();
+    world.capture.has_poses = false;
+    const Scan scan = make_scan(world.capture);
+    EXPECT_TRUE(scan.dropped.empty());
+    ASSERT_EQ(scan.cameras.size(), 42u);
+    EXPECT_LT(worst_shift(scan.cameras, truth), 0.002);
+}
+
+/// Frames next in time lie far apart, up and down: coarse pictures share few features, and most of
+/// those agree.
+TEST(Tracking, FindsLostFramesAgain) {
+    TinyWorldOptions options;
+    options.views = 42;
+    options.arc_deg = 260;
+    options.height = 180;
+    const TinyWorld world = make_tiny_world(options);
+    TrackingOptions many_only;
+    many_only.min_agreeing = many_only.min_inliers;
+    const auto tracked = [&](const TrackingOptions& how) {
+        const Tracking tracking = track_poses(world.capture, how);
+        return std::count(tracking.is_tracked.begin(), tracking.is_tracked.end(), true);
+    };
+    EXPECT_LT(tracked(many_only), 36);
+    EXPECT_GE(tracked({}), 38);
 }
 
 TEST(Tracking, FindsPosesOfTexturedViews) {

@@ -78,7 +78,7 @@ TinyWorld make_tiny_world(const TinyWorldOptions& options) {
     const Accel accel(parts);
     for (int i = 0; i < options.views; ++i) {
         const double azimuth = radians(options.arc_deg) * i / std::max(1, options.views - 1);
-        const double elevation = radians(35 + 12 * std::sin(1.7 * i));
+        const double elevation = radians(35 + options.nod_deg * std::sin(1.7 * i));
         const Vec3 eye = 0.6 * Vec3(std::cos(azimuth) * std::cos(elevation),
                                     std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
         Camera camera;

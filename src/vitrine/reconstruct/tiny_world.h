@@ -13,6 +13,7 @@ namespace vitrine {
 struct TinyWorldOptions {
     int views = 10;
     double arc_deg = 300;
+    double nod_deg = 12;   ///< elevations lie around 35 degrees, up and down from view to view
     bool has_liar = true;  ///< a ball of 4 cm radius whose depth has holes and lies
     double depth_noise_m = 3e-4;
     int width = 240, height = 160;

@@ -10,7 +10,7 @@
 #include <opencv2/features2d.hpp>
 
 #include <algorithm>
-#include <optional>
+#include <set>
 
 namespace vitrine {
 namespace {
@@ -18,6 +18,8 @@ namespace {
 constexpr float kMaxRatio = 0.9f;         // best to second-best descriptor distance
 constexpr double kMaxDepthStep_m = 0.01;  // around a feature: beyond, its depth is not its own
 constexpr double kBaseTolerance_m = 0.004;
+constexpr std::size_t kLostRounds = 4;
+constexpr std::size_t kLostPartners = 24;  // tracked frames that a lost one is compared with
 
 struct Features {
     std::vector<Vec3> points;  ///< in the camera
@@ -115,7 +117,7 @@ std::vector<std::pair<int, int>> match(const Features& a, const Features& b) {
 struct Link {
     std::size_t a = 0, b = 0;
     Rigid3 b_from_a;
-    int inliers = 0;
+    int matches = 0, inliers = 0;
 };
 
 Link connect(const Features& fa, const Features& fb, Link link, int trials) {
@@ -126,6 +128,7 @@ Link connect(const Features& fa, const Features& fb, Link link, int trials) {
         to.push_back(fb.points[static_cast<std::size_t>(j)]);
     }
     if (from.size() < 4) return link;
+    link.matches = static_cast<int>(from.size());
     const auto inliers_of = [&](const Rigid3& motion) {
         std::vector<std::size_t> inliers;
         for (std::size_t k = 0; k < from.size(); ++k) {
@@ -162,20 +165,29 @@ Link connect(const Features& fa, const Features& fb, Link link, int trials) {
     return link;
 }
 
+/// Neighbours in time and marks from afar; of few frames all pairs.
 std::vector<Link> pairs_to_try(std::size_t count, std::size_t all_pairs_up_to) {
     std::vector<Link> links;
     for (std::size_t a = 0; a < count; ++a) {
         for (std::size_t b = a + 1; b < count; ++b) {
             const bool are_near = b - a <= 4, are_marks = a % 10 == 0 && b % 10 == 0;
-            if (count <= all_pairs_up_to || are_near || are_marks) links.push_back({a, b, {}, 0});
+            if (count <= all_pairs_up_to || are_near || are_marks)
+                links.push_back({a, b, {}, 0, 0});
         }
     }
     return links;
 }
 
+/// Many points that move as one body; or fewer, when most matches do: wrong ones scatter.
+bool is_connection(const Link& link, const TrackingOptions& options) {
+    return link.inliers >= options.min_inliers ||
+           (link.inliers >= options.min_agreeing &&
+            double(link.inliers) >= options.min_agreement * double(link.matches));
+}
+
 /// Prim's algorithm from one frame: the strongest link that leaves the tree, again and again.
 Tracking grow_tree(const Capture& capture, const std::vector<Link>& links, std::size_t root,
-                   int min_inliers) {
+                   const TrackingOptions& options) {
     const std::size_t count = capture.frames.size();
     Tracking tracking;
     tracking.cameras = cameras_of(capture);
@@ -187,7 +199,7 @@ Tracking grow_tree(const Capture& capture, const std::vector<Link>& links, std::
         const Link* best = nullptr;
         for (const Link& link : links) {
             if (tracking.is_tracked[link.a] == tracking.is_tracked[link.b]) continue;
-            if (link.inliers >= min_inliers && (!best || link.inliers > best->inliers)) {
+            if (is_connection(link, options) && (!best || link.inliers > best->inliers)) {
                 best = &link;
             }
         }
@@ -205,6 +217,52 @@ Tracking grow_tree(const Capture& capture, const std::vector<Link>& links, std::
     return tracking;
 }
 
+std::size_t tracked_frames(const Tracking& tracking) {
+    return static_cast<std::size_t>(
+        std::count(tracking.is_tracked.begin(), tracking.is_tracked.end(), true));
+}
+
+/// The largest group of connected frames.
+Tracking largest_group(const Capture& capture, const std::vector<Link>& links,
+                       const TrackingOptions& options) {
+    Tracking best;
+    std::size_t most = 0;
+    std::vector<bool> is_seen(capture.frames.size(), false);
+    for (std::size_t root = 0; root < is_seen.size(); ++root) {
+        if (is_seen[root]) continue;
+        Tracking tracking = grow_tree(capture, links, root, options);
+        for (std::size_t i = 0; i < is_seen.size(); ++i) {
+            is_seen[i] = is_seen[i] || tracking.is_tracked[i];
+        }
+        const std::size_t size = tracked_frames(tracking);
+        if (size > most) {
+            most = size;
+            best = std::move(tracking);
+        }
+    }
+    return best;
+}
+
+/// Untried pairs between each lost frame and frames spread over those that are tracked: the camera
+/// may come back to a place, and frames next in time may lie far apart in space.
+std::vector<Link> pairs_of_lost(const Tracking& tracking, std::size_t partners, std::size_t round,
+                                std::set<std::pair<std::size_t, std::size_t>>& tried) {
+    std::vector<std::size_t> known;
+    for (std::size_t i = 0; i < tracking.is_tracked.size(); ++i) {
+        if (tracking.is_tracked[i]) known.push_back(i);
+    }
+    const std::size_t step = std::max<std::size_t>(1, known.size() / partners);
+    std::vector<Link> links;
+    for (std::size_t lost = 0; lost < tracking.is_tracked.size(); ++lost) {
+        if (tracking.is_tracked[lost]) continue;
+        for (std::size_t k = round % step; k < known.size(); k += step) {
+            const auto [a, b] = std::pair(std::min(lost, known[k]), std::max(lost, known[k]));
+            if (tried.emplace(a, b).second) links.push_back({a, b, {}, 0, 0});
+        }
+    }
+    return links;
+}
+
 }  // namespace
 
 Tracking track_poses(const Capture& capture, const TrackingOptions& options,
@@ -216,28 +274,28 @@ Tracking track_poses(const Capture& capture, const TrackingOptions& options,
         features[i] = find_features(capture.frames[i], options.max_features);
     });
     progress.update(0.3, "matching views");
-    std::vector<Link> links =
+    std::vector<Link> links;
+    std::set<std::pair<std::size_t, std::size_t>> tried;
+    const auto connect_all = [&](std::vector<Link> pairs) {
+        parallel_for(pairs.size(), 1, [&](std::size_t k) {
+            Link& link = pairs[k];
+            link = connect(features[link.a], features[link.b], link, options.trials);
+        });
+        links.insert(links.end(), pairs.begin(), pairs.end());
+    };
+    std::vector<Link> first =
         pairs_to_try(count, static_cast<std::size_t>(options.all_pairs_up_to));
-    parallel_for(links.size(), 1, [&](std::size_t k) {
-        links[k] = connect(features[links[k].a], features[links[k].b], links[k], options.trials);
-    });
-    Tracking best;
-    std::size_t most = 0;
-    std::vector<bool> is_seen(count, false);
-    for (std::size_t root = 0; root < count; ++root) {
-        if (is_seen[root]) continue;
-        Tracking tracking = grow_tree(capture, links, root, options.min_inliers);
-        std::size_t size = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            size += tracking.is_tracked[i] ? 1 : 0;
-            is_seen[i] = is_seen[i] || tracking.is_tracked[i];
-        }
-        if (size > most) {
-            most = size;
-            best = std::move(tracking);
-        }
+    for (const Link& link : first) tried.emplace(link.a, link.b);
+    connect_all(std::move(first));
+    Tracking tracking = largest_group(capture, links, options);
+    for (std::size_t round = 0; round < kLostRounds && tracked_frames(tracking) < count; ++round) {
+        progress.update(0.6 + 0.1 * double(round), "looking for lost frames");
+        std::vector<Link> pairs = pairs_of_lost(tracking, kLostPartners, round, tried);
+        if (pairs.empty()) break;
+        connect_all(std::move(pairs));
+        tracking = largest_group(capture, links, options);
     }
-    return best;
+    return tracking;
 }
 
 }  // namespace vitrine
