@@ -176,7 +176,8 @@ void check_views(const Capture& capture, Verdicts& verdicts) {
     const bool has_enough = count >= kMinViews;
     verdicts.push_back(
         {has_enough ? Severity::Good : Severity::Problem,
-         fmt::format("{} frames of {} x {} pixels{}", count, camera.width, camera.height,
+         fmt::format("{} frame{} of {} x {} pixels{}", count, count == 1 ? "" : "s", camera.width,
+                     camera.height,
                      has_enough ? ""
                                 : ": too few for silhouettes of glass, 12 or more around the "
                                   "scene would do")});
@@ -194,6 +195,7 @@ void check_poses(const Capture& capture, Verdicts& verdicts) {
         verdicts.push_back({Severity::Note, "no poses: the camera will be tracked"});
         return;
     }
+    if (capture.frames.size() < 2) return;  // nothing to compare with
     const double baseline = largest_baseline(capture), depth = median_depth(capture);
     const bool has_parallax = baseline > 0.2 * depth;
     verdicts.push_back(

@@ -109,6 +109,13 @@ TEST_F(Check, TooFewViews) {
     EXPECT_TRUE(says(text, "5 frames of 96 x 64 pixels: too few")) << text;
 }
 
+TEST_F(Check, OneViewHasNothingToCompareWith) {
+    made_.frames = 1;
+    made_.write_tum(folder_);
+    const std::string text = only_complaint();
+    EXPECT_TRUE(says(text, "1 frame of 96 x 64 pixels: too few")) << text;
+}
+
 TEST_F(Check, NoParallax) {
     made_.orbit_rad = 0.004;
     made_.write_tum(folder_);
