@@ -2,6 +2,7 @@
 #include "command.h"
 #include "mlds_options.h"
 #include "pipeline/mlds_presets.h"
+#include "pipeline/mlds_stimuli.h"
 
 namespace vitrine::cli {
 namespace fs = std::filesystem;
@@ -43,9 +44,23 @@ void add_mlds_stimuli(CLI::App& mlds) {
         ->capture_default_str()
         ->check(CLI::IsMember({"photon", "path"}))
         ->group("Quality");
-    command->add_option("--samples", o->samples_per_pixel, "Paths per pixel")
+    command->add_option("--samples", o->samples_per_pixel, "Paths of every pixel")
         ->capture_default_str()
-        ->check(CLI::Range(1, 65536))
+        ->check(CLI::Range(2, 65536))
+        ->group("Quality");
+    command->add_option("--max-samples", o->max_samples_per_pixel, "Paths of a noisy pixel at most")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 65536))
+        ->group("Quality");
+    command->add_option("--deviation-l", o->deviation_l, "Deviation of L* at which a pixel is done")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber)
+        ->group("Quality");
+    command
+        ->add_option("--smooth-px", o->smooth_px,
+                     "Blur of light from all around on flat plain surfaces; 0 = none")
+        ->capture_default_str()
+        ->check(CLI::Range(0.0, 20.0))
         ->group("Quality");
     command->add_option("--photons", o->photon_count, "Photons per picture")
         ->capture_default_str()
@@ -89,8 +104,11 @@ void add_mlds_stimuli(CLI::App& mlds) {
         if (common->json) {
             fmt::print("{}", series_to_json(series));
         } else {
-            fmt::print("{} pictures in {}, exposure {:.4g}, noise {:.2f} L* (99th percentile)\n",
-                       series.images.size(), o->out, series.exposure, series.noise_delta_l);
+            fmt::print(
+                "{} pictures in {}, exposure {:.4g}; noise of L* (99th percentile): a picture "
+                "{:.2f}, as seen {:.2f}; difference of neighbours {:.2f}, as seen {:.2f}\n",
+                series.images.size(), o->out, series.exposure, series.noise.picture,
+                series.noise.picture_seen, series.noise.difference, series.noise.difference_seen);
         }
         return kDone;
     });

@@ -1,7 +1,8 @@
 """Runs whole sessions of `vitrine mlds serve` in headless Chromium.
 
-Usage: run.py PROGRAM SCRATCH. Exit 77 (skipped) where Node, Chromium or playwright-core are not to
-be had. With a third argument SCREENSHOTS the screens are saved there.
+Usage: run.py PROGRAM SCRATCH [SCREENSHOTS [STIMULI]]. Exit 77 (skipped) where Node, Chromium or
+playwright-core are not to be had. The screens are saved in the folder SCREENSHOTS; STIMULI is a
+folder of ten rendered pictures, shown in place of stripes.
 """
 
 import json
@@ -75,9 +76,12 @@ def main():
             skip("playwright-core could not be installed (no network?)")
     work = scratch / "work"
     shutil.rmtree(work, ignore_errors=True)
-    write_stimuli(work / "stimuli")
+    if len(sys.argv) > 4:
+        shutil.copytree(sys.argv[4], work / "stimuli")
+    else:
+        write_stimuli(work / "stimuli")
     environment = dict(os.environ, NODE_PATH=str(modules / "node_modules"))
-    arguments = [str(program), str(work), chromium, *sys.argv[3:]]
+    arguments = [str(program), str(work), chromium, *sys.argv[3:4]]
     result = subprocess.run(["node", str(HERE / "sessions.cjs"), *arguments], env=environment,
                             timeout=600)
     sys.exit(result.returncode)

@@ -51,6 +51,7 @@ async function begin(page, url, code, isPhotographed) {
   if (isPhotographed) await picture(page, 'calibration');
   await page.click('#next');
   await page.waitForFunction(() => document.querySelector('h1')?.textContent === 'Ready');
+  if (isPhotographed) await picture(page, 'ready');
   await page.click('#next');
 }
 

@@ -254,7 +254,10 @@ std::string series_to_json(const StimulusSeries& series) {
     root["linear"] = series.linear;
     root["integrator"] = series.integrator;
     root["exposure"] = series.exposure;
-    root["noise_delta_l"] = series.noise_delta_l;
+    root["noise_delta_l"] = {{"picture", series.noise.picture},
+                             {"picture_seen", series.noise.picture_seen},
+                             {"difference", series.noise.difference},
+                             {"difference_seen", series.noise.difference_seen}};
     return root.dump(2) + "\n";
 }
 
@@ -284,7 +287,12 @@ StimulusSeries series_from_json(const std::string& text, const std::string& name
     }
     series.integrator = root.text_or("integrator", "");
     series.exposure = root.number_or("exposure", 1.0);
-    series.noise_delta_l = root.number_or("noise_delta_l", 0.0);
+    if (root.has("noise_delta_l")) {
+        const JsonObject noise = root.object("noise_delta_l");
+        series.noise = {noise.number("picture"), noise.number("picture_seen"),
+                        noise.number("difference"), noise.number("difference_seen")};
+        noise.finish();
+    }
     root.finish();
     return series;
 }

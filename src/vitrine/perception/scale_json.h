@@ -16,6 +16,14 @@ std::string study_to_json(const StudyAnalysis& study);
 /// @throws InputError for anything that `study_to_json` would not have written.
 StudyAnalysis study_from_json(const std::string& text, const std::string& name);
 
+/// What chance adds to the lightness L*, exceeded in one pixel of a hundred.
+struct StimulusNoise {
+    double picture = 0.0;          ///< of one picture
+    double picture_seen = 0.0;     ///< the same after the blur of the computational observer
+    double difference = 0.0;       ///< of the difference between two neighbours of the series
+    double difference_seen = 0.0;  ///< the same after the blur
+};
+
 /// A rendered series: what `vitrine mlds stimuli` leaves beside its pictures.
 struct StimulusSeries {
     std::vector<double> ior;          ///< rising, one per rank
@@ -24,8 +32,7 @@ struct StimulusSeries {
     std::string title;                ///< for the experimenter
     std::string integrator;           ///< "photon" or "path"
     double exposure = 1.0;            ///< one factor for all pictures
-    double noise_delta_l = 0.0;       ///< standard deviation of L* between two renders of one
-                                      ///< stimulus, 99th percentile over pixels
+    StimulusNoise noise;
 };
 std::string series_to_json(const StimulusSeries& series);
 StimulusSeries series_from_json(const std::string& text, const std::string& name);

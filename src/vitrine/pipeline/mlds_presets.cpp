@@ -4,6 +4,7 @@
 #include "base/json_reader.h"
 #include "base/text.h"
 #include "geometry/primitives.h"
+#include "perception/scale_json.h"
 
 #include <algorithm>
 #include <cmath>
@@ -13,21 +14,27 @@ namespace {
 
 constexpr int kPictureSize = 512;
 constexpr double kLightDistance = 1.5;  // metres, as in the paper's captures
-const Vec3 kTableCentre(0.02, 0.0, 0.02);
+constexpr double kCameraDistance = 0.72;
 
 Vec3 from_angles(double azimuth_deg, double elevation_deg, double distance) {
     const double a = radians(azimuth_deg), e = radians(elevation_deg);
     return distance * Vec3(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
 }
 
-Camera make_camera() {
+/// What a picture shows: glass, shadow and caustic.
+struct View {
+    Vec3 centre;
+    double width_m = 0;  ///< of the picture, at the centre's distance
+};
+
+Camera make_camera(const View& view) {
     Camera camera;
     camera.id = "000000";
     camera.width = camera.height = kPictureSize;
-    camera.fx = camera.fy = 3.3 * kPictureSize;
+    camera.fx = camera.fy = kPictureSize * kCameraDistance / view.width_m;
     camera.cx = camera.cy = 0.5 * (kPictureSize - 1);
-    const Vec3 eye = kTableCentre + from_angles(-90.0, 38.0, 0.72);
-    camera.cam_from_world = look_at(eye, kTableCentre, Vec3::UnitZ()).inverse();
+    const Vec3 eye = view.centre + from_angles(-90.0, 40.0, kCameraDistance);
+    camera.cam_from_world = look_at(eye, view.centre, Vec3::UnitZ()).inverse();
     return camera;
 }
 
@@ -103,12 +110,13 @@ Mesh shell() {
 }
 
 /// A table, glass on it, and dim light from all around.
-SeriesSpec on_table(const std::string& title, Mesh glass, Light light, double from, double to) {
+SeriesSpec on_table(const std::string& title, Mesh glass, Light light, const View& view,
+                    double from, double to) {
     SeriesSpec spec;
     spec.title = title;
     spec.part = "glass";
     spec.ior = equal_steps(from, to, 10);
-    spec.scene.cameras.push_back(make_camera());
+    spec.scene.cameras.push_back(make_camera(view));
     Diffuse diffuse;
     diffuse.albedo = Rgb(0.62f, 0.60f, 0.56f);
     spec.scene.parts.push_back(make_part("table", table(), diffuse));
@@ -125,29 +133,30 @@ std::vector<std::string> mlds_preset_names() {
 }
 
 SeriesSpec make_mlds_preset(const std::string& name) {
-    const auto towards_table = [](const Vec3& position) {
-        return (kTableCentre - position).normalized().eval();
-    };
+    // Lamps stand so low that the caustic lies beyond its focus, where it is large enough to be
+    // told from its neighbours and seldom brighter than the display's white.
     if (name == "sphere_point") {
-        const Vec3 at = from_angles(165.0, 52.0, kLightDistance);
         return on_table("Glass ball under a point light",
                         make_sphere(0.035, Vec3(-0.02, 0, 0.0355), 44),
-                        PointLight{at, Rgb::Constant(2.2f)}, 1.400, 1.465);
+                        PointLight{from_angles(165.0, 38.0, kLightDistance), Rgb::Constant(2.2f)},
+                        {Vec3(0.018, 0, 0.018), 0.17}, 1.400, 1.465);
     }
     if (name == "bottle_point") {
-        const Vec3 at = from_angles(172.0, 48.0, kLightDistance);
         return on_table("Glass bottle under a point light", lifted(bottle(), 0.0005),
-                        PointLight{at, Rgb::Constant(2.2f)}, 1.500, 1.565);
+                        PointLight{from_angles(172.0, 50.0, kLightDistance), Rgb::Constant(2.2f)},
+                        {Vec3(0.042, 0, 0.038), 0.215}, 1.500, 1.565);
     }
     if (name == "shell_disc") {
-        const Vec3 at = from_angles(160.0, 55.0, kLightDistance);
+        const Vec3 at = from_angles(160.0, 38.0, kLightDistance);
         return on_table("Fluted glass under a small area light", shell(),
-                        DiscLight{at, towards_table(at), 0.03, Rgb::Constant(2.2f)}, 1.300, 1.380);
+                        DiscLight{at, -at.normalized(), 0.03, Rgb::Constant(2.2f)},
+                        {Vec3(0.028, 0, 0.015), 0.185}, 1.300, 1.380);
     }
     if (name == "cup_spot") {
-        const Vec3 at = from_angles(168.0, 50.0, kLightDistance);
+        const Vec3 at = from_angles(168.0, 46.0, kLightDistance);
         return on_table("Glass cup under a spot light", lifted(cup(), 0.0005),
-                        SpotLight{at, towards_table(at), Rgb::Constant(2.2f), 30.0}, 1.300, 1.375);
+                        SpotLight{at, -at.normalized(), Rgb::Constant(2.2f), 30.0},
+                        {Vec3(0.036, 0, 0.02), 0.195}, 1.300, 1.375);
     }
     throw InputError({"preset", "one of " + join(mlds_preset_names(), ", "), name, ""});
 }

@@ -2,7 +2,7 @@
 // making; the paper prints index ranges and kinds of light, not its meshes, sizes or camera.
 #pragma once
 
-#include "pipeline/mlds_stimuli.h"
+#include "pipeline/mlds_series.h"
 
 namespace vitrine {
 

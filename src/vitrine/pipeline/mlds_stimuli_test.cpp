@@ -3,6 +3,7 @@
 #include "image/image_io.h"
 #include "pipeline/mlds_presets.h"
 #include "pipeline/mlds_report.h"
+#include "pipeline/mlds_stimuli.h"
 
 #include <gtest/gtest.h>
 
@@ -67,13 +68,17 @@ TEST(MldsSeries, RendersASeriesThatDiffersMoreTheFartherApart) {
     spec.ior = {1.40, 1.42, 1.44, 1.46};
     StimuliOptions options;
     options.size_px = 48;
-    options.samples_per_pixel = 4;
-    options.photon_count = 60'000;
+    options.samples_per_pixel = options.max_samples_per_pixel = 4;
+    options.photon_count = 30'000;
+    options.gather_radius_m = 0.002;
     const fs::path folder = fs::temp_directory_path() / "vitrine_stimuli_test";
     fs::remove_all(folder);
     const StimulusSeries series = render_stimuli(spec, folder, options);
     ASSERT_EQ(series.images.size(), 4u);
     EXPECT_GT(series.exposure, 0.0);
+    EXPECT_GT(series.noise.picture, 0.0);
+    EXPECT_LT(series.noise.picture_seen, series.noise.picture);
+    EXPECT_LT(series.noise.difference_seen, series.noise.picture);
     for (const std::string& file : series.images) {
         EXPECT_EQ(read_png(folder / file).width, 48);
     }

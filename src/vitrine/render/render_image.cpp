@@ -1,5 +1,6 @@
 #include "render/render_image.h"
 
+#include "base/error.h"
 #include "base/parallel.h"
 #include "render/sample_plan.h"
 
@@ -131,8 +132,14 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
                             const Progress& progress) {
     Image<PixelSum> sums(camera.width, camera.height, PixelSum{});
     // The same in all passes, so that the mean over samples is that over passes.
-    Image<int> plan(camera.width, camera.height,
-                    std::max(1, (options.samples_per_pixel + pass_count - 1) / pass_count));
+    const auto share_of = [&](int samples) {
+        return std::max(1, (samples + pass_count - 1) / pass_count);
+    };
+    Image<int> plan(camera.width, camera.height, share_of(options.samples_per_pixel));
+    if (options.samples) {
+        VITRINE_CHECK(plan.same_size(*options.samples));
+        for (std::size_t i = 0; i < plan.size(); ++i) plan[i] = share_of((*options.samples)[i]);
+    }
     TranslucentLight translucent;
     for (int pass = 0; pass < pass_count; ++pass) {
         const double start = double(pass) / pass_count, share = 1.0 / pass_count;
@@ -149,7 +156,7 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
                                sampler.add_samples(x, y, plan(x, y) * (pass + 1), sums(x, y));
                            });
         };
-        const bool is_planned = pass > 0 || options.max_samples_per_pixel <= 0;
+        const bool is_planned = pass > 0 || options.samples || options.max_samples_per_pixel <= 0;
         run(0.15, is_planned ? 1.0 : 0.4);
         if (!is_planned) {
             plan = plan_pass(sums, options, pass_count);

@@ -10,9 +10,11 @@
 namespace vitrine {
 
 struct FinalOptions {
-    int samples_per_pixel = 64;       ///< everywhere
-    int max_samples_per_pixel = 0;    ///< where the picture is noisy; 0: no more than everywhere
-    double noise_target = 0.01;       ///< standard error wanted there, of the pixel's own level
+    int samples_per_pixel = 64;     ///< everywhere
+    int max_samples_per_pixel = 0;  ///< where the picture is noisy; 0: no more than everywhere
+    double noise_target = 0.01;     ///< standard error wanted there, of the pixel's own level
+    /// Paths of each pixel, of the camera's size: takes the place of the three numbers above.
+    const Image<int>* samples = nullptr;
     bool use_photons = true;          ///< false: the reference path tracer alone
     int pass_photon_count = 500'000;  ///< photons of a progressive pass; more of them, more passes
     /// `gather_radius_m` is that of the first pass; 0: half a pixel's width at the scene's centre.

@@ -104,6 +104,27 @@ TEST(RenderImage, NoisyPixelsGetMoreSamples) {
     EXPECT_LT(adaptive, 0.5 * plain);
 }
 
+TEST(RenderImage, GivenSamplesAreThoseOfAnEvenPictureWithAsMany) {
+    Scene scene;
+    scene.parts.push_back(make_part(make_plane(1.0), Diffuse{Rgb::Constant(0.5f), {}, {}, false}));
+    scene.lights.push_back(DiscLight{Vec3(0, 0, 1), Vec3(0, 0, -1), 0.2, Rgb::Constant(1.0f)});
+    const RenderScene prepared(scene);
+    const Camera camera = small_camera(Vec3(0, -1, 0.6), Vec3(0, 0, 0), 8, 40);
+    FinalOptions options;
+    options.use_photons = false;
+    options.samples_per_pixel = 4;
+    const ImageRgb few = render_image(prepared, camera, options).radiance;
+    options.samples_per_pixel = 32;
+    const ImageRgb many = render_image(prepared, camera, options).radiance;
+    Image<int> samples(8, 8, 4);
+    samples(3, 5) = 32;
+    options.samples = &samples;
+    const ImageRgb mixed = render_image(prepared, camera, options).radiance;
+    EXPECT_TRUE((mixed(3, 5) == many(3, 5)).all());
+    EXPECT_TRUE((mixed(4, 5) == few(4, 5)).all());
+    EXPECT_FALSE((many(4, 5) == few(4, 5)).all());
+}
+
 TEST(SamplePlan, SamplesFollowTheVariance) {
     ImageF variance(9, 1, 1.0f), target(9, 1, 1.0f);
     const Image<int> count(9, 1, 8);
