@@ -47,11 +47,7 @@ class FrameRenderer {
 
     void add_samples(int x, int y, int target, PixelSums& sums) const {
         for (; sums.count < target; ++sums.count) {
-            const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)),
-                                      static_cast<std::uint32_t>(sums.count));
-            const Vec2f jitter = sampler.pair(0, 0);
-            const Vec3f direction =
-                camera_.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5).cast<float>();
+            const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
             const PathTracer& tracer =
                 tracers_[static_cast<std::size_t>(sums.count) % tracers_.size()];
             const PathResult with = tracer.trace(origin_, direction, sampler, kAllParts);

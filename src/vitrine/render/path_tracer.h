@@ -40,6 +40,21 @@ struct PathResult {
     Rgb total() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
 };
 
+/// Sample `index` of a pixel: a ray through a place in its square, and the path's random numbers.
+/// Renderers that share a seed share them.
+struct CameraSample {
+    PathSampler sampler;
+    Vec3f direction;
+};
+inline CameraSample camera_sample(const Camera& camera, std::uint64_t seed, int x, int y,
+                                  int index) {
+    const PathSampler sampler(stream_key(seed, unsigned(x), unsigned(y)),
+                              static_cast<std::uint32_t>(index));
+    const Vec2f jitter = sampler.pair(0, 0);
+    const Vec3 ray = camera.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5);
+    return {sampler, ray.cast<float>()};
+}
+
 class PathTracer {
   public:
     /// @param caustics may be null: the reference; kept by reference, as is the scene

@@ -107,11 +107,7 @@ class ImageSampler {
     /// Brings the pixel to `target` samples.
     void add_samples(int x, int y, int target, PixelSum& sums) const {
         for (; sums.count < target; ++sums.count) {
-            const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)),
-                                      static_cast<std::uint32_t>(sums.count));
-            const Vec2f jitter = sampler.pair(0, 0);
-            const Vec3f direction =
-                camera_.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5).cast<float>();
+            const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
             const Rgb value = tracer_.trace(origin_, direction, sampler, kAllParts).total();
             sums.sum += value.cast<double>();
             sums.square += static_cast<double>(luminance(value)) * luminance(value);
