@@ -332,7 +332,14 @@ void note_doubtful_support(const SceneViews& views, const CandidateOptions& opti
 }
 
 Candidates outlines_only(const Capture& capture, const Scan& scan) {
+    constexpr double kMinUpright = 0.5;  // 60 degrees off
     Candidates result;
+    if (scan.support_plane.normal.dot(likely_up(scan.cameras)) < kMinUpright) {
+        result.notes.push_back(
+            "the plane with the most depth faces aside, as a wall does: no surface was seen that "
+            "carries things. Take the picture from above, or put a cloth under what stands on a "
+            "polished surface");
+    }
     for (std::size_t i = 0; i < capture.frames.size(); ++i) {
         for (Outline& outline : find_outlines(capture.frames[i], scan.cameras[i],
                                               scan.support_plane, capture.saturation_level)) {

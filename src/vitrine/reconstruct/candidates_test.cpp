@@ -122,6 +122,20 @@ TEST(SupportDoubt, MeasuresTheTableThatGivesNoDepth) {
     EXPECT_NEAR(doubt_of(world.capture).doubtful_m2, kPi * 0.08 * 0.08, 0.006);
 }
 
+TEST(Candidates, OneViewOfAWallSaysSo) {
+    TinyWorldOptions options;
+    options.views = 1;
+    const TinyWorld world = make_tiny_world(options);
+    Scan scan = make_scan(world.capture, kept_poses());
+    EXPECT_EQ(find_candidates(world.capture, scan).notes.size(), 1u);
+    const Camera& camera = scan.cameras[0];
+    const Vec3 aside = camera.cam_from_world.rotation.transpose() * Vec3(-0.8, 0, -0.6);
+    scan.support_plane = {aside, aside.dot(camera.centre_in_world()) - 0.6};
+    const Candidates candidates = find_candidates(world.capture, scan);
+    ASSERT_EQ(candidates.notes.size(), 2u);
+    EXPECT_NE(candidates.notes[0].find("as a wall does"), std::string::npos);
+}
+
 TEST(Candidates, SameBitsForAnyThreadCount) {
     const TinyWorld world = make_tiny_world(small_tiny_world());
     CandidateOptions options;

@@ -73,20 +73,15 @@ std::vector<Vec3> sample_points(const Capture& capture, const std::vector<Camera
     return points;
 }
 
-/// The plane that carries things: of the largest planes, one that faces up rather than a wall. Up
-/// is what the cameras take for up: nobody films a table lying on the side.
+/// The plane that carries things: of the largest planes, one that faces up rather than a wall.
 Plane find_support_plane(const Capture& capture, const std::vector<Camera>& cameras,
                          double max_depth_m) {
     constexpr int kPlanes = 4;
     constexpr double kMinShare = 0.03;  // of the points: smaller ones carry nothing
     std::vector<Vec3> points = sample_points(capture, cameras, max_depth_m);
-    Vec3 eye = Vec3::Zero(), up = Vec3::Zero();
-    for (const Camera& camera : cameras) {
-        eye += camera.centre_in_world() / double(cameras.size());
-        // A camera that looks down sees the table's normal half in its -y, half in its -z.
-        up -= camera.cam_from_world.rotation.transpose() * Vec3(0, 1, 0.5);
-    }
-    up.normalize();
+    Vec3 eye = Vec3::Zero();
+    for (const Camera& camera : cameras) eye += camera.centre_in_world() / double(cameras.size());
+    const Vec3 up = likely_up(cameras);
     const double tolerance = 2.5 * depth_noise_m(0.5 * max_depth_m);
     const std::size_t all = points.size();
     Plane best;
@@ -213,6 +208,15 @@ bool find_exposures(const Capture& capture, Scan& scan) {
 }
 
 }  // namespace
+
+Vec3 likely_up(std::span<const Camera> cameras) {
+    Vec3 up = Vec3::Zero();
+    for (const Camera& camera : cameras) {
+        // A camera that looks down sees the table's normal half in its -y, half in its -z.
+        up -= camera.cam_from_world.rotation.transpose() * Vec3(0, 1, 0.5);
+    }
+    return up.normalized();
+}
 
 Capture frames_of_scan(Capture capture, const Scan& scan) {
     std::vector<RgbdFrame> frames;

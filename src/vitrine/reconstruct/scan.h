@@ -6,6 +6,7 @@
 #include "geometry/mesh.h"
 #include "geometry/plane.h"
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,6 +51,9 @@ struct Scan {
 /// @throws InputError when there is no usable depth, or too few frames find their pose.
 Scan make_scan(const Capture& capture, const ScanOptions& options = {},
                const Progress& progress = {});
+
+/// Up in the world as the cameras have it: nobody films a table lying on the side. Unit vector.
+Vec3 likely_up(std::span<const Camera> cameras);
 
 /// The capture as the scan knows it: dropped frames left out, exposures evened out. What comes
 /// after the scan works on this, frame by camera.
