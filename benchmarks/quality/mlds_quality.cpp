@@ -9,11 +9,11 @@
 #include "perception/observer_model.h"
 #include "perception/scale_bootstrap.h"
 #include "pipeline/mlds_stimuli.h"
+#include "process_cost.h"
 
 #include <fmt/format.h>
 
 #include <chrono>
-#include <ctime>
 #include <filesystem>
 
 namespace vitrine {
@@ -27,10 +27,10 @@ struct Times {
 template <typename Work>
 Times times_of(const Work& work) {
     const auto begin = std::chrono::steady_clock::now();
-    const std::clock_t cpu = std::clock();
+    const CpuTimer cpu;
     work();
     return {std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
-            static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC};
+            cpu.seconds()};
 }
 
 void time_analysis() {

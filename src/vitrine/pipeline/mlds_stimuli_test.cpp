@@ -1,9 +1,10 @@
+#include "pipeline/mlds_stimuli.h"
+
 #include "base/error.h"
 #include "base/file.h"
 #include "image/image_io.h"
 #include "pipeline/mlds_presets.h"
 #include "pipeline/mlds_report.h"
-#include "pipeline/mlds_stimuli.h"
 
 #include <gtest/gtest.h>
 

@@ -11,10 +11,10 @@ namespace vitrine {
 
 struct StimuliOptions {
     bool use_photons = true;    ///< false: path tracing alone, for lights that have a size
-    int samples_per_pixel = 8;  ///< of every pixel, for each kind of light; noisy ones get more
-    int max_samples_per_pixel = 64;
+    int samples_per_pixel = 4;  ///< of every pixel, for each kind of light; noisy ones get more
+    int max_samples_per_pixel = 32;
     double deviation_l = 0.2;  ///< standard deviation of L* at which a pixel has enough
-    std::uint64_t photon_count = 2'000'000;  ///< per picture
+    std::uint64_t photon_count = 1'500'000;  ///< per picture
     double gather_radius_m = 0.0006;  ///< of photons; 1.5 pixels of the presets, whose eye blurs as
                                       ///< much; 0: half a pixel's width
     double smooth_px = 2.5;  ///< sigma of the blur of light from evenly all around on flat surfaces
