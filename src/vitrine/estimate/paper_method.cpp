@@ -10,7 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <optional>
 
 namespace vitrine {
 
@@ -162,6 +162,123 @@ void set_glass(ObjectEstimate& object, const ObjectContext& context, int k,
     object.ior.residual_rms = object.sigma_a_per_m.residual_rms = object.cost_solid;
 }
 
+/// One candidate and its squared errors under every combination of lights.
+struct Candidate {
+    std::vector<ObjectPixel> pixels;
+    std::optional<MetalColumns> metal;  // specular or diffuse: `lobes` of each combination
+    std::vector<Combination> lobes;
+    std::vector<std::vector<double>> index_errors;  // transparent: [combination][index]
+};
+
+/// What the candidates share, and the sums over them.
+struct Search {
+    const ObjectContext& context;
+    const PaperOptions& options;
+    std::vector<std::vector<TrialLight>> places;
+    std::vector<double> intensities;
+    PaperCausticOptions caustic;
+    std::vector<double> iors;
+    std::vector<double> total;  // squared error of each combination, over all objects
+    double all_light = 1e-12;
+
+    Search(const ObjectContext& of, const LightEstimate& light, const PaperOptions& with)
+        : context(of), options(with), places(places_of(light, with)) {
+        for (const DiscLight& lamp : context.light.lights)
+            intensities.push_back(luminance(lamp.intensity_w_per_sr));
+        caustic.ior_step = options.ior_step;
+        caustic.photon_count = options.caustic_photon_count;
+        iors = ior_grid(caustic);
+    }
+
+    void add(std::size_t combination, double error) {
+        if (total.size() <= combination) total.resize(combination + 1, 0.0);
+        total[combination] += error;
+    }
+    std::size_t best() const {
+        return total.empty() ? 0
+                             : static_cast<std::size_t>(
+                                   std::min_element(total.begin(), total.end()) - total.begin());
+    }
+    /// The light of each lamp's place in a combination.
+    std::vector<TrialLight> lights_of(std::size_t combination) const {
+        std::vector<TrialLight> lights(places.size());
+        for (std::size_t l = places.size(); l-- > 0; combination /= places[l].size())
+            lights[l] = places[l][combination % places[l].size()];
+        return lights;
+    }
+};
+
+/// The class by the printed rule, or the one the user knows.
+ObjectEstimate classified(const Search& search, const Part& part, int k,
+                          const std::vector<ObjectPixel>& pixels, double reflectance,
+                          const ObjectOverride* known) {
+    ObjectEstimate object;
+    object.id = part.name;
+    object.mesh_file = part.mesh_file;
+    object.class_margin = paper_rule(search.context, k, pixels, reflectance).margin();
+    object.object_class =
+        object.class_margin > 0.0 ? ObjectClass::Transparent : ObjectClass::Specular;
+    if (pixels.empty()) {
+        object.object_class = ObjectClass::Unsure;
+        object.reason = "no pixel shows this object";
+    }
+    if (known && known->object_class) object.object_class = *known->object_class;
+    if (known && known->ignore) object.object_class = ObjectClass::Diffuse;
+    return object;
+}
+
+/// Ward's lobe at its best for every combination.
+void add_metal(Search& search, int k, Candidate& candidate) {
+    candidate.metal =
+        metal_columns(search.context, k, candidate.pixels, search.places, search.options);
+    candidate.lobes = score_combinations(candidate.metal->columns, search.intensities);
+    search.all_light += candidate.metal->columns.observed.squaredNorm();
+    for (std::size_t i = 0; i < candidate.lobes.size(); ++i)
+        search.add(i, candidate.lobes[i].squared_error);
+}
+
+/// Caustic and view through the object for every index; the view does not depend on the light.
+void add_glass(Search& search, int k, const CausticReceivers& receivers, double reflectance,
+               Candidate& candidate) {
+    const ObjectContext& context = search.context;
+    candidate.index_errors = caustic_errors(context, k, receivers, search.places,
+                                            search.intensities, reflectance, search.caustic);
+    for (std::size_t m = 0; m < search.iors.size(); ++m) {
+        const std::vector<ThroughPixel> through = look_through_plainly(
+            context.world, context.lookup, k, candidate.pixels, search.iors[m]);
+        double own = 0.0;
+        for (std::size_t i = 0; i < through.size(); ++i)
+            if (through[i].is_valid && !candidate.pixels[i].is_clipped)
+                own += std::pow(
+                    luminance(through[i].transmitted) - luminance(candidate.pixels[i].radiance),
+                    2.0);
+        for (std::vector<double>& row : candidate.index_errors) row[m] += own;
+    }
+    for (const float l : receivers.luminance) search.all_light += l * l;
+    for (std::size_t i = 0; i < candidate.index_errors.size(); ++i)
+        search.add(i, *std::min_element(candidate.index_errors[i].begin(),
+                                        candidate.index_errors[i].end()));
+}
+
+/// Fills in what the chosen combination says of one object.
+void set_material(const Search& search, int k, const Candidate& candidate, std::size_t best,
+                  const ObjectOverride* known, ObjectEstimate& object) {
+    if (candidate.metal) {
+        const WardFit fit =
+            ward_at(*candidate.metal, candidate.lobes[best], search.context.light.lights,
+                    search.context.bright, search.options);
+        object.clusters = {{1.0, fit}};
+        object.albedo = fit.albedo;
+        object.cost_ward = fit.cost;
+        object.cost_diffuse = fit.cost_diffuse;
+    } else if (!candidate.index_errors.empty()) {
+        const std::vector<double>& row = candidate.index_errors[best];
+        const auto least = std::min_element(row.begin(), row.end());
+        set_glass(object, search.context, k, candidate.pixels, search.iors,
+                  static_cast<std::size_t>(least - row.begin()), search.options, known);
+    }
+}
+
 }  // namespace
 
 PaperEstimate estimate_paper(const Scene& scene, std::span<const RgbdFrame> frames,
@@ -171,110 +288,48 @@ PaperEstimate estimate_paper(const Scene& scene, std::span<const RgbdFrame> fram
                              const Progress& progress) {
     PaperEstimate result;
     const ObjectContext context(scene, frames, saturation_level, light);
-    const std::vector<std::vector<TrialLight>> places = places_of(light, options);
-    std::vector<double> intensities;
-    for (const DiscLight& lamp : context.light.lights)
-        intensities.push_back(luminance(lamp.intensity_w_per_sr));
-    PaperCausticOptions caustic;
-    caustic.ior_step = options.ior_step;
-    caustic.photon_count = options.caustic_photon_count;
-    const std::vector<double> iors = ior_grid(caustic);
-
-    double seconds_metal = 0.0, seconds_glass = 0.0, all_light = 1e-12;
-    std::vector<double> total;  // squared error of each combination, over all objects
-    std::map<int, MetalColumns> metals;
-    std::map<int, std::vector<Combination>> lobes;
-    std::map<int, std::vector<std::vector<double>>> indices;
-    std::vector<std::vector<ObjectPixel>> pixels;
-    const auto add = [&](std::size_t combination, double error) {
-        if (total.size() <= combination) total.resize(combination + 1, 0.0);
-        total[combination] += error;
-    };
-    for (int k = 0; k < context.world.object_count(); ++k) {
-        progress.update(static_cast<double>(k) / context.world.object_count(),
-                        "all combinations of lights");
+    Search search(context, light, options);
+    const int count = context.world.object_count();
+    double seconds_metal = 0.0, seconds_glass = 0.0;
+    std::vector<Candidate> candidates(static_cast<std::size_t>(count));
+    for (int k = 0; k < count; ++k) {
+        progress.update(static_cast<double>(k) / count, "all combinations of lights");
         Timer timer;
         const Part& part = scene.parts[static_cast<std::size_t>(context.world.part_of_object(k))];
-        ObjectEstimate object;
-        object.id = part.name;
-        object.mesh_file = part.mesh_file;
-        pixels.push_back(object_pixels(context.world, context.lookup, k, pixel_options));
+        Candidate& candidate = candidates[static_cast<std::size_t>(k)];
+        candidate.pixels = object_pixels(context.world, context.lookup, k, pixel_options);
         const CausticReceivers receivers = find_receivers(context, k, light.plane);
         const double reflectance = receiver_reflectance(context, receivers);
-        object.class_margin = paper_rule(context, k, pixels.back(), reflectance).margin();
-        object.object_class =
-            object.class_margin > 0.0 ? ObjectClass::Transparent : ObjectClass::Specular;
-        if (pixels.back().empty()) {
-            object.object_class = ObjectClass::Unsure;
-            object.reason = "no pixel shows this object";
+        result.objects.push_back(classified(search, part, k, candidate.pixels, reflectance,
+                                            find_override(overrides, part.name)));
+        switch (result.objects.back().object_class) {
+            case ObjectClass::Specular:
+            case ObjectClass::Diffuse:
+                add_metal(search, k, candidate);
+                seconds_metal += timer.seconds();
+                break;
+            case ObjectClass::Transparent:
+                add_glass(search, k, receivers, reflectance, candidate);
+                seconds_glass += timer.seconds();
+                break;
+            case ObjectClass::Unsure:
+                break;
         }
-        if (const ObjectOverride* known = find_override(overrides, object.id)) {
-            if (known->object_class) object.object_class = *known->object_class;
-            if (known->ignore) object.object_class = ObjectClass::Diffuse;
-        }
-        if (object.object_class == ObjectClass::Specular ||
-            object.object_class == ObjectClass::Diffuse) {
-            metals[k] = metal_columns(context, k, pixels.back(), places, options);
-            lobes[k] = score_combinations(metals[k].columns, intensities);
-            all_light += metals[k].columns.observed.squaredNorm();
-            for (std::size_t i = 0; i < lobes[k].size(); ++i) add(i, lobes[k][i].squared_error);
-            seconds_metal += timer.seconds();
-        } else if (object.object_class == ObjectClass::Transparent) {
-            indices[k] =
-                caustic_errors(context, k, receivers, places, intensities, reflectance, caustic);
-            // The view through the object does not depend on the light.
-            for (std::size_t m = 0; m < iors.size(); ++m) {
-                const std::vector<ThroughPixel> through =
-                    look_through_plainly(context.world, context.lookup, k, pixels.back(), iors[m]);
-                double own = 0.0;
-                for (std::size_t i = 0; i < through.size(); ++i)
-                    if (through[i].is_valid && !pixels.back()[i].is_clipped)
-                        own += std::pow(luminance(through[i].transmitted) -
-                                            luminance(pixels.back()[i].radiance),
-                                        2.0);
-                for (std::vector<double>& row : indices[k]) row[m] += own;
-            }
-            for (const float l : receivers.luminance) all_light += l * l;
-            for (std::size_t i = 0; i < indices[k].size(); ++i)
-                add(i, *std::min_element(indices[k][i].begin(), indices[k][i].end()));
-            seconds_glass += timer.seconds();
-        }
-        result.objects.push_back(object);
     }
-    std::size_t best = 0;
-    for (std::size_t i = 0; i < total.size(); ++i)
-        if (total[i] < total[best]) best = i;
-    if (!total.empty()) {
-        result.error_initial = total[0] / all_light;
-        result.error_joint = total[best] / all_light;
+    const std::size_t best = search.best();
+    if (!search.total.empty()) {
+        result.error_initial = search.total[0] / search.all_light;
+        result.error_joint = search.total[best] / search.all_light;
     }
-
-    std::vector<int> place(places.size(), 0);
-    std::size_t rest = best;
-    for (std::size_t l = places.size(); l-- > 0; rest /= places[l].size())
-        place[l] = static_cast<int>(rest % places[l].size());
-    for (std::size_t l = 0; l < places.size(); ++l) {
-        const TrialLight& chosen = places[l][static_cast<std::size_t>(place[l])];
-        light.lights[l].light.position_m = chosen.position_m;
-        light.lights[l].light.normal = chosen.normal;
+    const std::vector<TrialLight> chosen = search.lights_of(best);
+    for (std::size_t l = 0; l < chosen.size(); ++l) {
+        light.lights[l].light.position_m = chosen[l].position_m;
+        light.lights[l].light.normal = chosen[l].normal;
     }
-    for (std::size_t k = 0; k < result.objects.size(); ++k) {
-        ObjectEstimate& object = result.objects[k];
-        const auto index = static_cast<int>(k);
-        if (metals.contains(index)) {
-            const WardFit fit = ward_at(metals[index], lobes[index][best], context.light.lights,
-                                        context.bright, options);
-            object.clusters = {{1.0, fit}};
-            object.albedo = fit.albedo;
-            object.cost_ward = fit.cost;
-            object.cost_diffuse = fit.cost_diffuse;
-        } else if (indices.contains(index)) {
-            const std::vector<double>& row = indices[index][best];
-            const auto least = std::min_element(row.begin(), row.end());
-            set_glass(object, context, index, pixels[k], iors,
-                      static_cast<std::size_t>(least - row.begin()), options,
-                      find_override(overrides, object.id));
-        }
+    for (int k = 0; k < count; ++k) {
+        ObjectEstimate& object = result.objects[static_cast<std::size_t>(k)];
+        set_material(search, k, candidates[static_cast<std::size_t>(k)], best,
+                     find_override(overrides, object.id), object);
     }
     result.seconds = {{"specular", seconds_metal}, {"transparent", seconds_glass}};
     progress.update(1.0);
