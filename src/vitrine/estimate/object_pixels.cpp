@@ -55,6 +55,11 @@ Silhouette silhouette_of(const EstimationScene& scene, const Camera& camera, int
     return s;
 }
 
+/// A square of side one pixel over a normal that turns by `du` and `dv` from pixel to pixel.
+float variance_within(const Vec3f& du, const Vec3f& dv) {
+    return (du.squaredNorm() + dv.squaredNorm()) / 12.0f;
+}
+
 bool is_deep_inside(const Silhouette& s, int u, int v, int border) {
     for (const auto& [du, dv] : {std::pair{border, 0}, std::pair{-border, 0}, std::pair{0, border},
                                  std::pair{0, -border}, std::pair{0, 0}})
@@ -89,6 +94,13 @@ std::vector<ObjectPixel> object_pixels(const EstimationScene& scene, const Frame
                     scene.accel().closest({eye, pixel.direction, 0.0f, 1e30f, kAllMask});
                 if (!hit.is_hit()) continue;
                 pixel.surface = {hit_point(mesh, hit), shading_normal(mesh, hit)};
+                const auto turn = [&](int du, int dv) -> Vec3f {
+                    const Vec3f ray = camera.ray_in_world(u + du, v + dv).cast<float>();
+                    const Hit near = scene.accel().closest({eye, ray, 0.0f, 1e30f, kAllMask});
+                    if (near.part != hit.part) return Vec3f::Zero();
+                    return shading_normal(mesh, near) - pixel.surface.normal;
+                };
+                pixel.normal_variance = variance_within(turn(1, 0), turn(0, 1));
                 pixel.radiance = colour(u, v);
                 for (int c = 0; c < 3; ++c)
                     pixel.is_at_least[static_cast<std::size_t>(c)] =

@@ -25,7 +25,6 @@ constexpr double kMinBrushedRatio = 1.25;
 constexpr double kBrushedProbe = 1.5;  // factor of the first look at two roughnesses
 constexpr double kBrushedHint = 0.02;  // share it must win for a search to be worth its time
 constexpr double kMinLitShare = 0.02;  // of the pixels: less shows no lobe
-constexpr double kSqrt2 = 1.41421356237;
 
 enum class Use : std::uint8_t { None, Equal, AtLeast };
 
@@ -98,19 +97,36 @@ Search search_brushed(const SpecularModel& model, double bright, const SpecularO
     return {{x, y, isotropic.lobe.form}, best.value, false};
 }
 
-/// Normals of a hull scatter: the lobe seen is the true one widened by them.
-void correct_for_normals(WardFit& fit, const WardLobe& lobe, bool is_at_bound, double noise) {
-    const auto corrected = [noise](double sigma) {
-        return std::sqrt(std::max(sigma * sigma - 2.0 * noise * noise, 1e-4));
+/// Mean square turn of the normal within a pixel that sees the lobe, rad^2, the weighted median
+/// over pixels: a pixel shows the mean over its square, the model the middle.
+double variance_within_pixels(const std::vector<ObjectPixel>& pixels,
+                              const SpecularColumns& columns) {
+    std::vector<double> variance, weight;
+    double total = 0.0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        variance.push_back(pixels[i].normal_variance);
+        weight.push_back(luminance(columns.lobe[i]));
+        total += weight.back();
+    }
+    return total > 0.0 ? weighted_median(variance, weight) : 0.0;
+}
+
+/// The lobe seen is the true one widened by normals that turn (`variance`, rad^2, both axes).
+void correct_for_normals(WardFit& fit, const WardLobe& lobe, bool is_at_bound, double variance) {
+    // Not below this share of the square seen: what is left would be a difference of errors.
+    constexpr double kMinShare = 0.5;
+    const auto corrected = [variance](double sigma) {
+        return std::sqrt(std::max(sigma * sigma - variance, kMinShare * sigma * sigma));
     };
     fit.ward.form = lobe.form;
     fit.ward.sigma_x = corrected(lobe.sigma_x);
     fit.ward.sigma_y = corrected(lobe.sigma_y);
     fit.sigma.value = std::sqrt(fit.ward.sigma_x * fit.ward.sigma_y);
     fit.sigma.outcome = Outcome::Converged;
-    if (fit.sigma.value < kSqrt2 * noise) {
+    if (variance > kMinShare * lobe.sigma_x * lobe.sigma_y) {
         fit.sigma.outcome = Outcome::NotIdentifiable;
-        fit.sigma.reason = "the hull's normals scatter more than the lobe is wide";
+        fit.sigma.reason =
+            "normals turn more, over the hull or within a pixel, than the lobe is wide";
     } else if (is_at_bound) {
         fit.sigma.outcome = Outcome::AtBound;
         fit.sigma.reason = "the best roughness lies at the end of the range";
@@ -252,12 +268,18 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
         all += s + luminance(Rgb(best.rho_d * columns.diffuse[i]));
     }
     fit.lobe_share = lobe / all;
-    correct_for_normals(fit, found.lobe, found.is_at_bound, options.normal_noise_rad);
+    const double variance = 2.0 * options.normal_noise_rad * options.normal_noise_rad +
+                            variance_within_pixels(model.pixels(), columns);
+    correct_for_normals(fit, found.lobe, found.is_at_bound, variance);
     if (model.lit_share() < kMinLitShare) {
         fit.sigma.outcome = Outcome::NotIdentifiable;
         fit.sigma.reason = "no lamp reaches what the pictures show of it: there is no highlight";
     }
     set_deviations(model, found.lobe, bright, fit);
+    // The correction holds for the mean pixel: half of it is doubt.
+    const double corrected_by =
+        std::sqrt(found.lobe.sigma_x * found.lobe.sigma_y) - fit.sigma.value;
+    fit.sigma.stddev = std::hypot(fit.sigma.stddev, 0.5 * corrected_by);
     add_model_error(fit);
     if (options.is_certified) {
         WardBoundOptions bound;
