@@ -10,6 +10,17 @@ namespace {
 
 constexpr double kMaxDirectionDeviationDeg = 15.0;  // more doubt is no answer
 
+double irradiance(const PolarLight& light) {
+    return light.weight / (light.distance_m * light.distance_m);
+}
+
+const LampError& model_error_of(const LightSet& set, std::size_t k) {
+    if (set.lights.size() == 1) return kSingleLamp;
+    for (const PolarLight& other : set.lights)
+        if (irradiance(other) > irradiance(set.lights[k])) return kWeakerLamp;
+    return kStrongestLamp;
+}
+
 }  // namespace
 
 FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_t k,
@@ -20,15 +31,14 @@ FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_
     fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
     fitted.is_distant = is_distant;
     const LightDeviation deviation = light_deviation(fit, set, k);
-    const double several = set.lights.size() > 1 ? kSeveralLamps : 1.0;
+    const LampError& model = model_error_of(set, k);
+    const double log_distance = kDistanceShare * deviation.log_distance;
     fitted.stddev_direction_deg =
-        degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, kModelDirectionRad));
-    fitted.stddev_distance_m =
-        polar.distance_m * std::hypot(deviation.log_distance, several * kModelLogDistance);
+        degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, model.direction_rad));
+    fitted.stddev_distance_m = polar.distance_m * std::hypot(log_distance, model.log_distance);
     fitted.stddev_radius_m =
         trial.radius_m * std::hypot(deviation.log_radius, deviation.log_distance, kModelLogRadius);
-    fitted.stddev_intensity_ratio =
-        std::hypot(2.0 * deviation.log_distance, several * kModelLogIntensity);
+    fitted.stddev_intensity_ratio = std::hypot(2.0 * log_distance, model.log_intensity);
     fitted.outcome = Outcome::Converged;
     if (!deviation.is_identifiable || fitted.stddev_direction_deg > kMaxDirectionDeviationDeg) {
         fitted.outcome = Outcome::NotIdentifiable;

@@ -20,6 +20,7 @@ constexpr double kMinElevationSine = 0.05;  // lower lights graze the table and 
 constexpr double kFirstRadiusPerMetre = 0.04;
 constexpr double kMinDistancePerRadius = 0.8, kMaxDistancePerRadius = 12.0;
 constexpr double kPenalty = 10.0;
+constexpr double kUnknownLog = 0.7;  // deviation of a logarithm that nothing shows: a factor of two
 constexpr double kBoundMargin = 1.05;  // this near its end of the range, a light lies at it
 
 Vec3 tilted(const Vec3& direction, double x, double y) {
@@ -33,6 +34,33 @@ void sort_by_cost(std::vector<LightSet>& sets) {
     std::stable_sort(sets.begin(), sets.end(), [](const LightSet& a, const LightSet& b) {
         return a.score.cost < b.score.cost;
     });
+}
+
+// Two angles, log distance, log radius of one light.
+constexpr int kCount = 4;
+using Vector = Eigen::Matrix<double, kCount, 1>;
+using Matrix = Eigen::Matrix<double, kCount, kCount>;
+
+bool is_flat(const Matrix& hessian, int a) {
+    constexpr double kFlat = 1e-3;  // of a loss in [0, 1]
+    return hessian(a, a) < kFlat;
+}
+
+/// Inverse of the curvature. Unlike quantities are scaled to unit curvature first; what does not
+/// curve at all is left out (zeros), and no combination is taken to be vaguer than 1 / kMinShare.
+Matrix inverse_of(const Matrix& hessian) {
+    constexpr double kMinShare = 0.05;
+    Vector scale = Vector::Zero();
+    for (int a = 0; a < kCount; ++a)
+        if (!is_flat(hessian, a)) scale[a] = 1.0 / std::sqrt(hessian(a, a));
+    const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * hessian *
+                                                       scale.asDiagonal());
+    Matrix inverse = Matrix::Zero();
+    for (int a = 0; a < kCount; ++a) {
+        const Vector v = scale.cwiseProduct(solver.eigenvectors().col(a));
+        inverse += v * v.transpose() / std::max(solver.eigenvalues()[a], kMinShare);
+    }
+    return inverse;
 }
 
 }  // namespace
@@ -218,11 +246,7 @@ double evidence_of_distance(const LightFit& fit, const LightSet& near, const Lig
 }
 
 LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k) {
-    // Two angles, log distance, log radius: steps wide enough to cross several samples at every
-    // shadow border.
-    constexpr int kCount = 4;
-    using Vector = Eigen::Matrix<double, kCount, 1>;
-    using Matrix = Eigen::Matrix<double, kCount, kCount>;
+    // Steps wide enough to cross several samples at every shadow border.
     const Vector steps(0.02, 0.02, 0.08, 0.3);
     constexpr int kDiscSamples = 16;
     std::vector<double> weight;
@@ -273,24 +297,20 @@ LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::si
     deviation.is_at_bound =
         light.distance_m < kBoundMargin * kMinDistancePerRadius * fit.samples().scene_radius_m ||
         light.direction.dot(fit.samples().plane.normal) < kBoundMargin * kMinElevationSine;
-    deviation.is_identifiable = hessian(0, 0) > 0.0 && hessian(1, 1) > 0.0;
+    deviation.is_identifiable = !is_flat(hessian, 0) && !is_flat(hessian, 1);
     Matrix meat = Matrix::Zero();
     for (const auto& [block, sum] : block_sum) {
         const Vector s = sum / total_weight;
         meat += s * s.transpose();
     }
-    // Directions in which the cost does not curve upward carry no information.
-    const Eigen::SelfAdjointEigenSolver<Matrix> solver(hessian);
-    Matrix inverse = Matrix::Zero();
-    for (int a = 0; a < kCount; ++a) {
-        const double curvature = std::max(solver.eigenvalues()[a], 1e-3);
-        const Vector v = solver.eigenvectors().col(a);
-        inverse += v * v.transpose() / curvature;
-    }
+    const Matrix inverse = inverse_of(hessian);
     const Matrix covariance = inverse * meat * inverse;
+    const auto deviation_of = [&](int a) {
+        return is_flat(hessian, a) ? kUnknownLog : std::sqrt(std::max(0.0, covariance(a, a)));
+    };
     deviation.direction_rad = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
-    deviation.log_distance = std::sqrt(std::max(0.0, covariance(2, 2)));
-    deviation.log_radius = std::sqrt(std::max(0.0, covariance(3, 3)));
+    deviation.log_distance = deviation_of(2);
+    deviation.log_radius = deviation_of(3);
     return deviation;
 }
 

@@ -15,8 +15,10 @@ namespace vitrine {
 
 namespace {
 
-constexpr int kScoutStride = 3;     // one third of the samples finds the basin
-constexpr std::size_t kStarts = 4;  // grid lights that are refined
+constexpr int kScoutStride = 3;        // one third of the samples finds the basin
+constexpr int kDensePerCandidate = 4;  // shadows of small things lock within half a step of it
+constexpr double kMinStartSeparationRad = 0.35;  // one and a half steps of the dense grid
+constexpr std::size_t kStarts = 5;               // grid lights that are refined
 // A second light must explain this share of what one leaves (by evidence, see docs/estimation.md).
 constexpr double kSecondLightGain = 0.18;
 constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are texture
@@ -30,6 +32,20 @@ constexpr double kMinSeparationRad = 0.436;
 RefineOptions with_distances_of(const LightFit& fit, const LightSet& set, RefineOptions options) {
     options.keep_distances = has_distant(fit, set);
     return options;
+}
+
+/// The best grid lights, no two of one basin.
+std::vector<LightSet> starts_of(const std::vector<LightSet>& singles) {
+    std::vector<LightSet> starts;
+    for (const LightSet& single : singles) {
+        const bool is_apart = std::all_of(starts.begin(), starts.end(), [&](const LightSet& start) {
+            return angle_between(start.lights[0].direction, single.lights[0].direction) >
+                   kMinStartSeparationRad;
+        });
+        if (is_apart) starts.push_back(single);
+        if (starts.size() == kStarts) break;
+    }
+    return starts;
 }
 
 LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEstimate& estimate,
@@ -46,9 +62,14 @@ LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEsti
                               .step_rad = 0.12,
                               .refine_radius = false};
     std::vector<LightSet> refined;
-    for (std::size_t i = 0; i < std::min(kStarts, singles.size()); ++i)
-        refined.push_back(
-            refine_lights(fit, singles[i], with_distances_of(fit, singles[i], scout)));
+    const HemisphereGrid dense =
+        make_hemisphere(fit.samples(), kDensePerCandidate * options.candidate_count);
+    for (const LightSet& start : starts_of(search_single(fit, dense, kScoutStride))) {
+        refined.push_back(refine_lights(fit, start, with_distances_of(fit, start, scout)));
+        const Vec3& d = refined.back().lights[0].direction;
+        log_debug("lights: start cost {:.4f} -> {:.4f} toward ({:.2f}, {:.2f}, {:.2f})",
+                  start.score.cost, refined.back().score.cost, d.x(), d.y(), d.z());
+    }
     std::stable_sort(refined.begin(), refined.end(), [](const LightSet& a, const LightSet& b) {
         return a.score.cost < b.score.cost;
     });
@@ -216,6 +237,10 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
     if (frames.size() < 2) {
         estimate.outcome = Outcome::NotIdentifiable;
         estimate.reason = "only one view: no second picture checks geometry and light";
+        for (FittedLight& fitted : estimate.lights) {
+            fitted.outcome = estimate.outcome;
+            fitted.reason = estimate.reason;
+        }
     }
     progress.update(1.0);
     return estimate;

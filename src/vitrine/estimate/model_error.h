@@ -1,7 +1,7 @@
 // estimate/model_error.h: what resampling does not see. Bootstraps over views and patches know
 // noise and texture; they share the errors of the hull, the mesh, the light and the model itself.
-// These terms are added in squares. All were set after looking at 37 worlds (seeds 0 to 36) of
-// benchmarks/quality/estimation_worlds: other seeds must check them. No capture was looked at.
+// These terms are added in squares. All were set with made worlds (which ones:
+// docs/estimation.md, "How sure"), never with a capture.
 #pragma once
 
 #include "estimate/specular.h"
@@ -9,13 +9,19 @@
 
 namespace vitrine {
 
-// Lights: direction per axis; distance, disc radius and intensity relative.
-constexpr double kModelDirectionRad = 0.013;
-constexpr double kModelLogDistance = 0.05;
-constexpr double kModelLogRadius = 0.27;
-constexpr double kModelLogIntensity = 0.10;
-// Of several lamps each may stand nearer and weaker while another makes up for it.
-constexpr double kSeveralLamps = 2.5;  // times the terms of distance and intensity
+/// Of one lamp.
+struct LampError {
+    double direction_rad;  ///< per axis
+    double log_distance, log_intensity;
+};
+constexpr LampError kSingleLamp = {0.009, 0.012, 0.045};
+// Of several lamps each may stand nearer and weaker while another makes up for it; the weaker one
+// shows in little but its own shadows.
+constexpr LampError kStrongestLamp = {0.009, 0.035, 0.075};
+constexpr LampError kWeakerLamp = {0.022, 0.085, 0.22};
+constexpr double kModelLogRadius = 0.25;
+// Block sums take texture to be worse for the distance than it is: it has no 1 / r^2.
+constexpr double kDistanceShare = 0.5;
 
 // Index: grows with the residual, which is large where the hull is off.
 constexpr double kModelIorPerCost = 0.25;
@@ -26,7 +32,7 @@ constexpr double kModelAbsorptionRatio = 0.05;
 constexpr double kModelLogSigma = 0.04;
 constexpr double kModelRhoD = 0.0015;  // absolute: next to a lobe little is left for diffuse light
 constexpr double kModelLogRhoD = 0.02;
-constexpr double kModelLogRhoS = 0.10;
+constexpr double kModelLogRhoS = 0.08;
 
 void add_model_error(TransparentFit& solid, const TransparentOptions& options);
 void add_model_error(WardFit& fit);
