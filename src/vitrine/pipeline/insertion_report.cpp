@@ -164,7 +164,13 @@ void write_insertion_report(const fs::path& workspace, const std::string& captur
     const std::vector<JsonObject> objects = estimate.objects("objects");
     for (const JsonObject& object : objects) body += object_rows(object);
     body += "</table>\n";
-    if (objects.empty()) {
+    if (estimate.text_or("lights_outcome", "converged") != "converged")
+        body += fmt::format("<p class=\"note\">The light is {}: {}.</p>\n",
+                            estimate.text("lights_outcome"),
+                            escape_html(estimate.text_or("lights_reason", "no reason given")));
+    if (objects.empty() && estimate.objects("lights").empty()) {
+        body += "<p class=\"note\">Without a light no material was measured.</p>\n";
+    } else if (objects.empty()) {
         body +=
             "<p class=\"note\">No glass or metal was found: a valid scene, with diffuse things "
             "only.</p>\n";
