@@ -1,5 +1,6 @@
 // Errors of the estimators, and of the doubts they report, over many made worlds:
-//   vitrine_estimation_worlds [--seeds FIRST:LAST] [--results FILE.jsonl] [--verbose]
+//   vitrine_estimation_worlds [--seeds FIRST:LAST] [--results FILE.jsonl] [--only-metal]
+//                             [--joint separate|likelihoods|highlights] [--verbose]
 //   vitrine_estimation_worlds --report FILE.jsonl [FILE...] [--only odd|even]
 // Each world is one line of FILE; seeds already there are skipped, so a run can be stopped and
 // resumed, and several may run side by side on files of their own. Seeds with which constants of
@@ -50,16 +51,31 @@ WorldOptions world_of(std::uint64_t seed) {
 
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
-void run_worlds(std::uint64_t first, std::uint64_t last, const std::filesystem::path& file) {
+/// Tells a search that missed from pictures that do not say.
+void print_cost_at_truth(const World& world, const SceneEstimate& estimate) {
+    LightOptions options = first_light_options(world.capture, {});
+    for (const ObjectEstimate& object : estimate.objects)
+        options.object_classes.push_back(object.object_class);
+    options.start = world.lights;
+    const LightEstimate at_truth = estimate_lights(world.labelled, world.capture.frames,
+                                                   world.capture.saturation_level, options);
+    std::printf("cost of the light found %.4f, refined from the true one %.4f\n",
+                estimate.light.error_refined, at_truth.error_refined);
+}
+
+void run_worlds(std::uint64_t first, std::uint64_t last, bool is_only_metal, bool is_verbose,
+                const EstimateOptions& estimation, const std::filesystem::path& file) {
     std::set<std::uint64_t> done;
     for (const WorldErrors& known : read_world_errors(file)) done.insert(known.seed);
     for (std::uint64_t seed = first; seed <= last; ++seed) {
         if (done.contains(seed)) continue;
         const WorldOptions options = world_of(seed);
+        if (is_only_metal && options.object != WorldObject::Metal) continue;
         const double start = cpu_seconds();
         const World world = make_world(options);
         const double made = cpu_seconds();
-        const SceneEstimate estimate = estimate_scene(world.labelled, world.capture);
+        const SceneEstimate estimate = estimate_scene(world.labelled, world.capture, estimation);
+        if (is_verbose) print_cost_at_truth(world, estimate);
         WorldErrors errors = compare(options, world, estimate);
         errors.world_cpu_seconds = made - start;
         errors.estimate_cpu_seconds = cpu_seconds() - made;
@@ -76,6 +92,8 @@ int main(int argc, char** argv) {
     std::filesystem::path results = "estimation_worlds.jsonl";
     std::vector<std::filesystem::path> reports;
     std::string only;
+    bool is_only_metal = false, is_verbose = false;
+    EstimateOptions estimation;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
         if (argument == "--seeds" && i + 1 < argc) {
@@ -87,7 +105,15 @@ int main(int argc, char** argv) {
             results = argv[++i];
         } else if (argument == "--only" && i + 1 < argc) {
             only = argv[++i];
+        } else if (argument == "--only-metal") {
+            is_only_metal = true;
+        } else if (argument == "--joint" && i + 1 < argc) {
+            const std::string mode = argv[++i];
+            estimation.joint.mode = mode == "likelihoods"  ? JointMode::Likelihoods
+                                    : mode == "highlights" ? JointMode::HighlightsFirst
+                                                           : JointMode::Separate;
         } else if (argument == "--verbose") {
+            is_verbose = true;
             set_log_level(LogLevel::Debug);
         } else if (argument == "--report") {
             while (i + 1 < argc && argv[i + 1][0] != '-') reports.emplace_back(argv[++i]);
@@ -97,7 +123,7 @@ int main(int argc, char** argv) {
         }
     }
     if (reports.empty()) {
-        run_worlds(first, last, results);
+        run_worlds(first, last, is_only_metal, is_verbose, estimation, results);
         reports = {results};
     }
     std::vector<WorldErrors> all;
