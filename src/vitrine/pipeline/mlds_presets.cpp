@@ -96,13 +96,14 @@ Mesh cup() {
     return make_lathe(profile, 64);
 }
 
-/// The fine shape: a flattened ball with twelve spiral flutes, like a sea shell.
+/// The fine shape: a flattened ball with ten shallow spiral flutes, like a sea shell. Deeper ones bend
+/// the table into patterns finer than a pixel, whose noise would be seen.
 Mesh shell() {
-    Mesh mesh = make_sphere(1.0, Vec3::Zero(), 56);
+    Mesh mesh = make_sphere(1.0, Vec3::Zero(), 72);
     for (Vec3f& v : mesh.vertices) {
         const Vec3 d = v.cast<double>().normalized();
         const double around = std::atan2(d.y(), d.x()), belt = 1 - d.z() * d.z();
-        const double radius = 0.042 * (1 + 0.07 * belt * std::cos(12 * around + 5 * d.z()));
+        const double radius = 0.042 * (1 + 0.025 * belt * belt * std::cos(10 * around + 4 * d.z()));
         v = Vec3(radius * d.x(), radius * d.y(), 0.8 * radius * d.z()).cast<float>();
     }
     mesh.normals = vertex_normals(mesh);
