@@ -1,8 +1,8 @@
 // Photometric error over the error of the light (the paper's Fig. 13), by kind of cue:
 //   vitrine_error_curve [--scan CACHE] [--azimuths N] CAPTURE...
-// The first true lamp is turned about the middle of the scene by each angle, toward N sides; strength,
-// ambient light, Ward lobes and refractive index are fitted again at each place. Mean over the sides.
-// Without --scan the true meshes are used.
+// The first true lamp is turned about the middle of the scene by each angle, toward N sides;
+// strength, ambient light, Ward lobes and refractive index are fitted again at each place. Mean
+// over the sides. Without --scan the true meshes are used.
 #include "estimate/caustic_cue.h"
 #include "estimate/object_context.h"
 #include "estimate/scene_estimate.h"
@@ -64,8 +64,8 @@ void print_curve(const std::string& name, const Scene& scene, const Capture& cap
         const int sides = angle == 0.0 ? 1 : azimuths;
         std::vector<double> sum(1 + ours.objects.size(), 0.0);
         for (int side = 0; side < sides; ++side) {
-            options.start = with_first_turned(truth.lights, truth.reference_point_m,
-                                              radians(angle), 2.0 * kPi * side / sides);
+            options.start = with_first_turned(truth.lights, truth.reference_point_m, radians(angle),
+                                              2.0 * kPi * side / sides);
             const LightEstimate light =
                 estimate_lights(scene, capture.frames, capture.saturation_level, options);
             sum[0] += light.error_refined / sides;

@@ -10,6 +10,8 @@
 #include "render/render_object.h"
 #include "render/translucent_shadow_map.h"
 
+#include <algorithm>
+
 namespace vitrine {
 namespace {
 
@@ -177,6 +179,29 @@ TransferSession::TransferSession(PhotoAnalysis object, IrradianceSource irradian
 void TransferSession::set_lights(const ViewLights& lights) {
     object_.lights.lights = lights;
     irradiance_ = irradiance_from_lights(object_.relief, lights, options_.eta);
+    lit_.clear();
+}
+
+const ImageRgb& TransferSession::diffuse_of(const RadialProfile& material,
+                                            bool use_shadow_maps) const {
+    constexpr std::size_t kKept = 2;  // at the scale asked for, and at 1 for its colour
+    const auto is_same = [&](const Lit& lit) {
+        return lit.use_shadow_maps == use_shadow_maps && lit.material.r == material.r &&
+               std::equal(lit.material.rd.begin(), lit.material.rd.end(), material.rd.begin(),
+                          material.rd.end(),
+                          [](const Rgbd& a, const Rgbd& b) { return (a == b).all(); });
+    };
+    const auto found = std::find_if(lit_.begin(), lit_.end(), is_same);
+    if (found != lit_.end()) {
+        std::rotate(found, found + 1, lit_.end());
+        return lit_.back().diffuse;
+    }
+    if (lit_.size() == kKept) lit_.erase(lit_.begin());
+    lit_.push_back({material, use_shadow_maps,
+                    use_shadow_maps ? render_translucent_shadow_maps(
+                                          object_.relief, object_.lights.lights, material, options_)
+                                    : renderer_->render(irradiance_, material)});
+    return lit_.back().diffuse;
 }
 
 ImageRgb TransferSession::highlight_layer(const TransferLook& look) const {
@@ -235,15 +260,11 @@ TransferPicture TransferSession::render(const RadialProfile& profile,
     const Mask& mask = object_.photo.mask;
     TransferPicture result;
     const RadialProfile stretched = look.scale == 1 ? profile : profile.scaled(look.scale);
-    const auto lit = [&](const RadialProfile& material) {
-        return look.use_shadow_maps ? render_translucent_shadow_maps(
-                                          object_.relief, object_.lights.lights, material, options_)
-                                    : renderer_->render(irradiance_, material);
-    };
-    result.diffuse = lit(stretched);
+    if (look.keep_colour && look.scale != 1) diffuse_of(profile, look.use_shadow_maps);
+    result.diffuse = diffuse_of(stretched, look.use_shadow_maps);
     if (look.keep_colour && look.scale != 1) {
         // Longer paths lose light in a finite body, and unequally per channel.
-        const ImageRgb reference = lit(profile);
+        const ImageRgb& reference = diffuse_of(profile, look.use_shadow_maps);
         Rgbd wanted = Rgbd::Zero(), found = Rgbd::Zero();
         for (std::size_t i = 0; i < mask.size(); ++i) {
             wanted += reference[i].cast<double>();

@@ -117,6 +117,8 @@ class TransferSession {
                     const TranslucentRenderOptions& options = {}, bool is_object_neutral = false,
                     double object_albedo = 0.7);
 
+    /// The last two materials' diffuse light is kept: a change of exposure or gloss does not ask
+    /// for it again. Not for several threads at once.
     /// @param profile of the material, in pixels of this photo (RadialProfile::scaled)
     TransferPicture render(const RadialProfile& profile, const TransferLook& look) const;
 
@@ -127,6 +129,12 @@ class TransferSession {
     const ReliefIrradiance& irradiance() const { return irradiance_; }
 
   private:
+    struct Lit {
+        RadialProfile material;
+        bool use_shadow_maps = false;
+        ImageRgb diffuse;
+    };
+    const ImageRgb& diffuse_of(const RadialProfile& material, bool use_shadow_maps) const;
     ImageRgb highlight_layer(const TransferLook& look) const;
 
     PhotoAnalysis object_;
@@ -136,6 +144,7 @@ class TransferSession {
     double level_ = 1;  ///< linear value of the photo where irradiance is pi on white
     ImageF alpha_;      ///< feathered mask
     std::vector<std::array<std::size_t, 2>> rim_;  ///< feather pixel outside, nearest inside
+    mutable std::vector<Lit> lit_;                 ///< under the present light, the latest last
 };
 
 /// The object recoloured as if opaque: albedo times irradiance over pi. The baseline.

@@ -107,6 +107,23 @@ TEST_F(TransferTest, ExposureActsOnDiffuseLightOnly) {
     EXPECT_NEAR(two(100, 100)[1] / one(100, 100)[1], 2, 1e-4);
 }
 
+TEST_F(TransferTest, WhatIsKeptEqualsWhatIsRenderedAfresh) {
+    TransferSession session(*object_);
+    const RadialProfile profile = lifted_->medium.profile();
+    ViewLights turned = object_->lights.lights;
+    for (ViewLight& light : turned.lights) light.direction.x() *= -1;
+    for (const double scale : {1.0, 1.5, 1.0}) {
+        TransferLook look;
+        look.scale = scale;
+        const ImageRgb kept = session.render(profile, look).diffuse;
+        const ImageRgb fresh = TransferSession(*object_).render(profile, look).diffuse;
+        EXPECT_TRUE((kept(100, 100) == fresh(100, 100)).all()) << scale;
+    }
+    const Rgb before = session.render(profile, {}).diffuse(100, 100);
+    session.set_lights(turned);
+    EXPECT_FALSE((session.render(profile, {}).diffuse(100, 100) == before).all());
+}
+
 TEST_F(TransferTest, LengthsCarryOver) {
     EXPECT_DOUBLE_EQ(length_ratio(50, 100, 0, 0), 2);
     EXPECT_DOUBLE_EQ(length_ratio(50, 100, 1000, 700), 0.7);

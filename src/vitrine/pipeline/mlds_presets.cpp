@@ -96,8 +96,8 @@ Mesh cup() {
     return make_lathe(profile, 64);
 }
 
-/// The fine shape: a flattened ball with ten shallow spiral flutes, like a sea shell. Deeper ones bend
-/// the table into patterns finer than a pixel, whose noise would be seen.
+/// The fine shape: a flattened ball with ten shallow spiral flutes, like a sea shell. Deeper ones
+/// bend the table into patterns finer than a pixel, whose noise would be seen.
 Mesh shell() {
     Mesh mesh = make_sphere(1.0, Vec3::Zero(), 72);
     for (Vec3f& v : mesh.vertices) {
