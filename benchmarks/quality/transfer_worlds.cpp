@@ -7,6 +7,7 @@
 // (with C(s) of a closed body; --flat leaves it out on both sides). --ground adds light from below.
 #include "base/rng.h"
 #include "compose/transfer.h"
+#include "estimate/translucent_world.h"
 #include "image/colour.h"
 #include "math/statistics.h"
 #include "optics/dipole.h"
@@ -18,6 +19,7 @@
 #include <string>
 
 using namespace vitrine;
+using testing_world::nearest_deg;
 
 namespace {
 
@@ -146,13 +148,6 @@ Photo photograph(const std::string& name, const Relief& relief, const ViewLights
     }
     photo.linear = srgb_to_linear(linear_to_srgb8(photo.linear));
     return photo;
-}
-
-double nearest_deg(const ViewLights& lights, const Vec3& direction) {
-    double best = 180;
-    for (const ViewLight& light : lights.lights)
-        best = std::min(best, degrees(angle_between(light.direction, direction)));
-    return best;
 }
 
 /// Radius within which half of the albedo lies.

@@ -260,17 +260,18 @@ TransferPicture TransferSession::render(const RadialProfile& profile,
     const Mask& mask = object_.photo.mask;
     TransferPicture result;
     const RadialProfile stretched = look.scale == 1 ? profile : profile.scaled(look.scale);
-    if (look.keep_colour && look.scale != 1) diffuse_of(profile, look.use_shadow_maps);
+    const auto sum_of = [](const ImageRgb& image) {
+        Rgbd sum = Rgbd::Zero();
+        for (const Rgb& pixel : image) sum += pixel.cast<double>();
+        return sum;
+    };
+    const bool is_recoloured = look.keep_colour && look.scale != 1;
+    Rgbd wanted = Rgbd::Zero();
+    if (is_recoloured) wanted = sum_of(diffuse_of(profile, look.use_shadow_maps));
     result.diffuse = diffuse_of(stretched, look.use_shadow_maps);
-    if (look.keep_colour && look.scale != 1) {
+    if (is_recoloured) {
         // Longer paths lose light in a finite body, and unequally per channel.
-        const ImageRgb& reference = diffuse_of(profile, look.use_shadow_maps);
-        Rgbd wanted = Rgbd::Zero(), found = Rgbd::Zero();
-        for (std::size_t i = 0; i < mask.size(); ++i) {
-            wanted += reference[i].cast<double>();
-            found += result.diffuse[i].cast<double>();
-        }
-        const Rgb factor = (wanted / found.max(1e-12)).cast<float>();
+        const Rgb factor = (wanted / sum_of(result.diffuse).max(1e-12)).cast<float>();
         for (Rgb& pixel : result.diffuse) pixel *= factor;
     }
     const auto level = static_cast<float>(level_ * look.exposure);

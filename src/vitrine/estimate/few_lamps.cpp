@@ -2,7 +2,6 @@
 
 #include "estimate/profile_fit.h"
 #include "math/nnls.h"
-#include "math/statistics.h"
 
 namespace vitrine {
 namespace {
@@ -30,12 +29,11 @@ class Fit {
   public:
     Fit(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
         const FewLampsOptions& options)
-        : object_(object), ground_colour_(ground_colour), options_(options), y_(exitance) {
-        for (int i = 0; i < options.length_count; ++i) {
-            lengths_.push_back(options.shortest_px *
-                               std::pow(options.longest_px / options.shortest_px,
-                                        static_cast<double>(i) / (options.length_count - 1)));
-        }
+        : object_(object),
+          ground_colour_(ground_colour),
+          options_(options),
+          y_(exitance),
+          lengths_(length_grid(options.shortest_px, options.longest_px, options.length_count)) {
         weight_ = MatrixXd::Zero(y_.rows(), kChannels);
         for (int c = 0; c < kChannels; ++c) {
             mean_[c] = y_.col(c).mean();
@@ -58,8 +56,7 @@ class Fit {
             fields.local.replicate(1, kChannels), repeated_bodies(static_cast<std::size_t>(count)));
         std::array<LengthImages, kChannels> images;
         for (const double length : lengths_) {
-            const MatrixXd all =
-                histogram.image_of([length](double r) { return std::exp(-r / length); });
+            const MatrixXd all = histogram.image_of(plain_exponential(length));
             for (int c = 0; c < kChannels; ++c) {
                 images[c].push_back(all.middleCols(c * count, count));
                 images[c].back().rightCols<1>() *= ground_colour_[c];
@@ -82,19 +79,13 @@ class Fit {
 
     /// Huber's weights from what `lamps` leaves: creases, ears and texture must not steer lamps.
     void reweight(const FewLamps& lamps) {
-        const std::array<MatrixXd, kChannels> images = kernel_images(lamps);
-        weight_ = base_weight_;
+        const std::array<MatrixXd, kChannels> images = kernel_images(lamps, operators_of(lamps));
         for (int c = 0; c < kChannels; ++c) {
             if (mean_[c] <= 0) continue;
             const VectorXd residual =
                 base_weight_.col(c).cwiseProduct(images[c] * lamps.intensity - y_.col(c));
-            const double bend =
-                1.5 * std::max(1e-6, robust_sd(std::vector<double>(
-                                         residual.data(), residual.data() + residual.size())));
-            for (Index i = 0; i < residual.size(); ++i) {
-                const double size = std::abs(residual[i]);
-                if (size > bend) weight_(i, c) *= std::sqrt(bend / size);
-            }
+            weight_.col(c) =
+                base_weight_.col(c).cwiseProduct(huber_factors(residual, 1e-6).cwiseSqrt());
         }
     }
 
@@ -115,10 +106,8 @@ class Fit {
 
     /// Moves the directions not held to where the misfit is least, kernels kept.
     void move(FewLamps& lamps, const std::vector<bool>& is_held, double first_step_deg) const {
-        std::vector<KernelImage> operators;
-        for (int c = 0; c < kChannels; ++c)
-            operators.emplace_back(object_, lamps.kernel[c], body_[c]);
-        std::array<MatrixXd, kChannels> images = kernel_images(lamps);
+        const std::vector<KernelImage> operators = operators_of(lamps);
+        std::array<MatrixXd, kChannels> images = kernel_images(lamps, operators);
         solve_intensities(images, lamps);
         const auto try_move = [&](std::size_t l, const Vec3& direction) {
             FewLamps trial = lamps;
@@ -153,7 +142,7 @@ class Fit {
     }
 
     double relative_residual(const FewLamps& lamps) const {
-        const std::array<MatrixXd, kChannels> images = kernel_images(lamps);
+        const std::array<MatrixXd, kChannels> images = kernel_images(lamps, operators_of(lamps));
         double sum = 0, count = 0;
         for (int c = 0; c < kChannels; ++c) {
             if (mean_[c] <= 0) continue;
@@ -188,11 +177,19 @@ class Fit {
         return result;
     }
 
-    std::array<MatrixXd, kChannels> kernel_images(const FewLamps& lamps) const {
+    std::vector<KernelImage> operators_of(const FewLamps& lamps) const {
+        std::vector<KernelImage> operators;
+        for (std::size_t c = 0; c < kChannels; ++c)
+            operators.emplace_back(object_, lamps.kernel[c], body_[c]);
+        return operators;
+    }
+
+    std::array<MatrixXd, kChannels> kernel_images(const FewLamps& lamps,
+                                                  const std::vector<KernelImage>& operators) const {
         const LightFields fields = object_.fields(lamps.directions, true);
         std::array<MatrixXd, kChannels> images;
         for (std::size_t c = 0; c < kChannels; ++c) {
-            images[c] = KernelImage(object_, lamps.kernel[c], body_[c])(fields);
+            images[c] = operators[c](fields);
             images[c].rightCols<1>() *= ground_colour_[static_cast<int>(c)];
         }
         return images;

@@ -31,16 +31,6 @@ MatrixXd shell_images(const DistanceHistogram& histogram, const ShellGrid& shell
     return images;
 }
 
-std::vector<double> length_grid(const ProfileFitOptions& options) {
-    std::vector<double> lengths;
-    for (int i = 0; i < options.length_count; ++i) {
-        lengths.push_back(options.shortest_px *
-                          std::pow(options.longest_px / options.shortest_px,
-                                   static_cast<double>(i) / (options.length_count - 1)));
-    }
-    return lengths;
-}
-
 /// Misfit weights: relative with a floor, so that dark pixels do not pull the mean.
 VectorXd base_weights(const VectorXd& y) {
     const double floor = std::max(0.7 * y.mean(), 1e-12);
@@ -49,16 +39,8 @@ VectorXd base_weights(const VectorXd& y) {
 
 /// Huber's weights on top, from the residuals of the last round.
 VectorXd huber_weights(const VectorXd& residual, const VectorXd& base) {
-    std::vector<double> scaled(static_cast<std::size_t>(residual.size()));
-    for (Index i = 0; i < residual.size(); ++i)
-        scaled[static_cast<std::size_t>(i)] = residual[i] * std::sqrt(base[i]);
-    const double bend = 1.5 * std::max(robust_sd(scaled), 1e-9);
-    VectorXd weight = base;
-    for (Index i = 0; i < residual.size(); ++i) {
-        const double size = std::abs(scaled[static_cast<std::size_t>(i)]);
-        if (size > bend) weight[i] *= bend / size;
-    }
-    return weight;
+    const VectorXd scaled = residual.cwiseProduct(base.cwiseSqrt());
+    return base.cwiseProduct(huber_factors(scaled, 1e-9));
 }
 
 /// A free profile that leaves less than this share of what an ordered one does refutes the order.
@@ -85,11 +67,31 @@ PairFit solve_pair(double uu, double uv, double vv, double uy, double vy, double
     return best;
 }
 
+}  // namespace
+
 RadialKernel plain_exponential(double length) {
     return [length](double r) { return std::exp(-r / length); };
 }
 
-}  // namespace
+std::vector<double> length_grid(double shortest, double longest, int count) {
+    std::vector<double> lengths;
+    for (int i = 0; i < count; ++i) {
+        lengths.push_back(shortest *
+                          std::pow(longest / shortest, static_cast<double>(i) / (count - 1)));
+    }
+    return lengths;
+}
+
+VectorXd huber_factors(const VectorXd& residual, double least_sd) {
+    const std::vector<double> values(residual.data(), residual.data() + residual.size());
+    const double bend = 1.5 * std::max(robust_sd(values), least_sd);
+    VectorXd factors = VectorXd::Ones(residual.size());
+    for (Index i = 0; i < residual.size(); ++i) {
+        const double size = std::abs(residual[i]);
+        if (size > bend) factors[i] = bend / size;
+    }
+    return factors;
+}
 
 TwoExponentials best_pair(const MatrixXd& images, const VectorXd& y, const VectorXd& weight,
                           const std::vector<double>& lengths) {
@@ -171,7 +173,8 @@ PiecewiseProfile fit_piecewise_qmr(const DistanceHistogram& histogram, const Vec
 
 TwoExponentials fit_exponentials(const DistanceHistogram& histogram, const VectorXd& exitance,
                                  int field, const ProfileFitOptions& options) {
-    const std::vector<double> lengths = length_grid(options);
+    const std::vector<double> lengths =
+        length_grid(options.shortest_px, options.longest_px, options.length_count);
     MatrixXd images(exitance.size(), static_cast<Index>(lengths.size()));
     for (std::size_t i = 0; i < lengths.size(); ++i)
         images.col(static_cast<Index>(i)) =
@@ -188,7 +191,8 @@ TwoExponentials fit_exponentials(const DistanceHistogram& histogram, const Vecto
 
 TwoExponentials fit_exponentials_to_shells(const ShellGrid& shells, const VectorXd& value,
                                            const ProfileFitOptions& options) {
-    const std::vector<double> lengths = length_grid(options);
+    const std::vector<double> lengths =
+        length_grid(options.shortest_px, options.longest_px, options.length_count);
     MatrixXd columns(value.size(), static_cast<Index>(lengths.size()));
     VectorXd area(value.size());
     for (Index k = 0; k < value.size(); ++k) {

@@ -38,6 +38,16 @@ PiecewiseProfile fit_piecewise_qmr(const DistanceHistogram& histogram,
                                    const Eigen::VectorXd& exitance, int field,
                                    const ProfileFitOptions& options);
 
+/// e^{-r / length}
+RadialKernel plain_exponential(double length);
+
+/// `count` lengths from the shortest to the longest, each the same factor longer.
+std::vector<double> length_grid(double shortest, double longest, int count);
+
+/// Huber's weights of squares: 1 up to 1.5 robust standard deviations (at least `least_sd`),
+/// falling as 1 / |residual| beyond.
+Eigen::VectorXd huber_factors(const Eigen::VectorXd& residual, double least_sd);
+
 /// The pair of lengths, with amplitudes >= 0, that best explains y: amplitudes follow in closed
 /// form from inner products (variable projection), every pair is tried.
 /// @param images one column per length: the picture of e^{-r / length}; @param weight of squares

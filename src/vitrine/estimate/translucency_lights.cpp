@@ -3,10 +3,10 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "estimate/few_lamps.h"
+#include "estimate/profile_fit.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "math/nnls.h"
-#include "math/statistics.h"
 
 #include <numeric>
 
@@ -74,13 +74,7 @@ struct KernelChoice {
 VectorXd robust_weights(const MatrixXd& image, const VectorXd& intensity, const VectorXd& y,
                         const VectorXd& weight) {
     const VectorXd residual = weight.cwiseProduct(image * intensity - y);
-    const double bend =
-        1.5 * std::max(1e-6, robust_sd(std::vector<double>(residual.data(),
-                                                           residual.data() + residual.size())));
-    VectorXd result = weight;
-    for (Index i = 0; i < residual.size(); ++i)
-        if (std::abs(residual[i]) > bend) result[i] *= std::sqrt(bend / std::abs(residual[i]));
-    return result;
+    return weight.cwiseProduct(huber_factors(residual, 1e-6).cwiseSqrt());
 }
 
 RadialKernel exponential(double g) {
@@ -259,12 +253,9 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     progress.update(0.4, "lights: light fields");
 
     constexpr int kWidths = 5;
-    std::vector<double> widths;
     std::vector<MatrixXd> images;
-    for (int i = 0; i < kWidths; ++i) {
-        widths.push_back(g_low * std::pow(g_high / g_low, static_cast<double>(i) / (kWidths - 1)));
-        images.push_back(histogram.image_of(exponential(widths.back())));
-    }
+    for (const double width : length_grid(g_low, g_high, kWidths))
+        images.push_back(histogram.image_of(exponential(width)));
     std::vector<KernelChoice> choices;
     for (int i = 0; i < kWidths; ++i) {
         choices.push_back({static_cast<double>(i), static_cast<double>(i), 1.0});

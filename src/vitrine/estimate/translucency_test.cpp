@@ -18,6 +18,7 @@ namespace {
 using testing_world::apple;
 using testing_world::ellipsoid;
 using testing_world::key_and_back;
+using testing_world::nearest_deg;
 
 struct World {
     Relief relief = ellipsoid(220, 100, 80);
@@ -35,13 +36,6 @@ struct World {
         return image;
     }
 };
-
-double nearest_deg(const ViewLights& lights, const Vec3& direction) {
-    double best = 180;
-    for (const ViewLight& light : lights.lights)
-        best = std::min(best, degrees(angle_between(light.direction, direction)));
-    return best;
-}
 
 TEST(DistanceHistogram, GivesThePictureOfTheRenderer) {
     const World world;

@@ -37,6 +37,14 @@ inline ViewLights key_and_back(const Relief& relief, double eta) {
     return lights;
 }
 
+/// Angle from `direction` to the nearest of the lights.
+inline double nearest_deg(const ViewLights& lights, const Vec3& direction) {
+    double best = 180;
+    for (const ViewLight& light : lights.lights)
+        best = std::min(best, degrees(angle_between(light.direction, direction)));
+    return best;
+}
+
 /// Dipole profiles of three media, with `px_per_mm` pixels to the millimetre.
 inline RadialProfile dipole_profile(const DipoleMedium (&per_mm)[3], double px_per_mm) {
     RadialProfile profile;
