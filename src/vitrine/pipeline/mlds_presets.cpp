@@ -96,18 +96,60 @@ Mesh cup() {
     return make_lathe(profile, 64);
 }
 
-/// The fine shape: a flattened ball with ten shallow spiral flutes, like a sea shell. Deeper ones
-/// bend the table into patterns finer than a pixel, whose noise would be seen.
-Mesh shell() {
-    Mesh mesh = make_sphere(1.0, Vec3::Zero(), 72);
-    for (Vec3f& v : mesh.vertices) {
-        const Vec3 d = v.cast<double>().normalized();
-        const double around = std::atan2(d.y(), d.x()), belt = 1 - d.z() * d.z();
-        const double radius = 0.042 * (1 + 0.025 * belt * belt * std::cos(10 * around + 4 * d.z()));
-        v = Vec3(radius * d.x(), radius * d.y(), 0.8 * radius * d.z()).cast<float>();
-    }
+/// The fine shape: an upright pane whose front is rippled, so that it draws a net of light. Ripples
+/// focus behind the pane's foot and before its top; each bends light once, far from total
+/// reflection, so that no pattern is finer than a pixel.
+Mesh pane() {
+    constexpr int kCells = 64;
+    constexpr double kSide = 0.07, kThickness = 0.008;  // metres
+    constexpr double kYawDeg = 30.0;
+    const auto ripple = [](double x, double z) {
+        constexpr double kHeight = 0.0002, kPerMetre = 420.0;
+        return kHeight * (std::sin(kPerMetre * (0.95 * x + 0.31 * z)) +
+                          std::sin(kPerMetre * (0.38 * x - 0.73 * z) + 1.0) +
+                          std::sin(kPerMetre * (0.61 * x + 0.52 * z) + 2.0));
+    };
+    Mesh mesh;
+    // One face after the other, with corners of its own: the edges stay sharp.
+    const auto add_face = [&](const auto& at, int columns, int rows) {
+        const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+        for (int j = 0; j <= rows; ++j) {
+            for (int i = 0; i <= columns; ++i) {
+                mesh.vertices.push_back(
+                    at(static_cast<double>(i) / columns, static_cast<double>(j) / rows)
+                        .template cast<float>());
+            }
+        }
+        const auto stride = static_cast<std::uint32_t>(columns) + 1;
+        for (std::uint32_t j = 0; j < static_cast<std::uint32_t>(rows); ++j) {
+            for (std::uint32_t i = 0; i + 1 < stride; ++i) {
+                const std::uint32_t a = first + j * stride + i, b = a + stride;
+                mesh.triangles.emplace_back(a, a + 1, b + 1);
+                mesh.triangles.emplace_back(a, b + 1, b);
+            }
+        }
+    };
+    const auto front = [&](double u, double v) {
+        const double x = kSide * (u - 0.5), z = kSide * v;
+        return Vec3(x, -0.5 * kThickness - ripple(x, z), z);
+    };
+    const auto back = [&](double u, double v) {
+        return Vec3(kSide * (u - 0.5), 0.5 * kThickness, kSide * v);
+    };
+    const auto between = [](const Vec3& a, const Vec3& b, double t) -> Vec3 {
+        return a + (b - a) * t;
+    };
+    add_face(front, kCells, kCells);
+    add_face([&](double u, double v) { return back(1 - u, v); }, kCells, kCells);
+    add_face([&](double u, double v) { return between(front(u, 1), back(u, 1), v); }, kCells, 1);
+    add_face([&](double u, double v) { return between(back(u, 0), front(u, 0), v); }, kCells, 1);
+    add_face([&](double u, double v) { return between(front(1, v), back(1, v), u); }, 1, kCells);
+    add_face([&](double u, double v) { return between(back(0, v), front(0, v), u); }, 1, kCells);
     mesh.normals = vertex_normals(mesh);
-    return lifted(mesh, 0.8 * 0.042 + 0.001);
+    Mat4 place = Mat4::Identity();
+    place.topLeftCorner<2, 2>() = Eigen::Rotation2Dd(radians(kYawDeg)).toRotationMatrix();
+    place(2, 3) = 0.0005;
+    return transformed(mesh, place);
 }
 
 /// A table, glass on it, and dim light from all around.
@@ -130,7 +172,7 @@ SeriesSpec on_table(const std::string& title, Mesh glass, Light light, const Vie
 }  // namespace
 
 std::vector<std::string> mlds_preset_names() {
-    return {"sphere_point", "bottle_point", "shell_disc", "cup_spot"};
+    return {"sphere_point", "bottle_point", "pane_disc", "cup_spot"};
 }
 
 SeriesSpec make_mlds_preset(const std::string& name) {
@@ -147,11 +189,11 @@ SeriesSpec make_mlds_preset(const std::string& name) {
                         PointLight{from_angles(172.0, 50.0, kLightDistance), Rgb::Constant(2.2f)},
                         {Vec3(0.042, 0, 0.038), 0.215}, 1.500, 1.565);
     }
-    if (name == "shell_disc") {
-        const Vec3 at = from_angles(160.0, 38.0, kLightDistance);
-        return on_table("Fluted glass under a small area light", shell(),
+    if (name == "pane_disc") {
+        const Vec3 at = from_angles(140.0, 46.0, kLightDistance);
+        return on_table("Rippled pane under a small area light", pane(),
                         DiscLight{at, -at.normalized(), 0.03, Rgb::Constant(2.2f)},
-                        {Vec3(0.028, 0, 0.015), 0.185}, 1.300, 1.380);
+                        {Vec3(0.016, -0.01, 0.02), 0.185}, 1.300, 1.380);
     }
     if (name == "cup_spot") {
         const Vec3 at = from_angles(168.0, 46.0, kLightDistance);

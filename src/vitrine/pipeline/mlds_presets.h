@@ -6,7 +6,7 @@
 
 namespace vitrine {
 
-/// "sphere_point" (1.400 to 1.465), "bottle_point" (1.500 to 1.565), "shell_disc" (1.300 to 1.380,
+/// "sphere_point" (1.400 to 1.465), "bottle_point" (1.500 to 1.565), "pane_disc" (1.300 to 1.380,
 /// fine shape, area light), "cup_spot" (1.300 to 1.375).
 std::vector<std::string> mlds_preset_names();
 

@@ -61,7 +61,7 @@ StimulusNoise measure_noise(const std::array<ImageRgb, 2>& pair,
 
 StimulusSeries render_stimuli(const SeriesSpec& spec, const fs::path& folder,
                               const StimuliOptions& options, const Progress& progress) {
-    constexpr double kPlanned = 0.05, kRendered = 0.8;  // shares of the time
+    constexpr double kPlanned = 0.08, kRendered = 0.85;  // shares of the time
     const std::size_t count = spec.ior.size(), middle = count / 2;
     const SeriesRenderer renderer(spec, options, progress.part(0.0, kPlanned));
     StimulusSeries series;
@@ -81,13 +81,10 @@ StimulusSeries render_stimuli(const SeriesSpec& spec, const fs::path& folder,
         write_exr(folder / series.linear.back(), picture);
         if (i + 1 == middle || i == middle) pair[i - (middle - 1)] = std::move(picture);
     }
-    StimuliOptions other = options;
-    ++other.seed;
-    other.exposure = series.exposure;
-    const SeriesRenderer repeated(spec, other, progress.part(kRendered, kRendered + kPlanned));
+    const SeriesRenderer repeated = renderer.with_seed(options.seed + 1);
     const std::array<ImageRgb, 2> again = {
-        repeated.render(spec.ior[middle - 1], progress.part(0.85, 0.92)),
-        repeated.render(spec.ior[middle], progress.part(0.92, 1.0))};
+        repeated.render(spec.ior[middle - 1], progress.part(kRendered, 0.9)),
+        repeated.render(spec.ior[middle], progress.part(0.9, 1.0))};
     series.noise = measure_noise(pair, again);
     write_text_file(folder / "stimuli.json", series_to_json(series));
     return series;

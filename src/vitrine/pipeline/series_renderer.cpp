@@ -214,6 +214,12 @@ void SeriesRenderer::plan(const Scene& scene, const Progress& progress) {
     surroundings_samples_ = planned(surroundings.variance, target);
 }
 
+SeriesRenderer SeriesRenderer::with_seed(std::uint64_t seed) const {
+    SeriesRenderer other = *this;
+    other.options_.seed = seed;
+    return other;
+}
+
 ImageRgb SeriesRenderer::render(double ior, const Progress& progress) const {
     const Scene scene = scene_at(spec_, ior);
     ImageRgb picture = render_lamps(scene, progress.part(0.0, 0.8)).radiance;

@@ -14,7 +14,7 @@ struct StimuliOptions {
     int samples_per_pixel = 4;  ///< of every pixel, for each kind of light; noisy ones get more
     int max_samples_per_pixel = 32;
     double deviation_l = 0.2;  ///< standard deviation of L* at which a pixel has enough
-    std::uint64_t photon_count = 1'500'000;  ///< per picture
+    std::uint64_t photon_count = 1'200'000;  ///< per picture
     double gather_radius_m = 0.0006;  ///< of photons; 1.5 pixels of the presets, whose eye blurs as
                                       ///< much; 0: half a pixel's width
     double smooth_px = 2.5;  ///< sigma of the blur of light from evenly all around on flat surfaces
@@ -40,6 +40,9 @@ class SeriesRenderer {
 
     /// The picture with the varied part at `ior`, exposed: 1 is the display's white.
     ImageRgb render(double ior, const Progress& progress = {}) const;
+    /// The same plan, exposure and counts of samples with other random numbers: what pictures of
+    /// both differ by is noise.
+    SeriesRenderer with_seed(std::uint64_t seed) const;
 
     double exposure() const { return exposure_; }
     /// Paths per pixel for the light of the lamps and for that from all around.

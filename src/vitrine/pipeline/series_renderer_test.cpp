@@ -104,8 +104,8 @@ TEST(SeriesRenderer, PathsNeedLampsThatTheyCanMeet) {
     StimuliOptions options = small_pictures();
     options.use_photons = false;
     EXPECT_THROW(SeriesRenderer(make_mlds_preset("cup_spot"), options), InputError);
-    const SeriesRenderer shell(make_mlds_preset("shell_disc"), options);
-    EXPECT_GT(shell.exposure(), 0.0);
+    const SeriesRenderer pane(make_mlds_preset("pane_disc"), options);
+    EXPECT_GT(pane.exposure(), 0.0);
 }
 
 TEST(SeriesRenderer, ASceneWithoutLightIsRefused) {

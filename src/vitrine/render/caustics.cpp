@@ -110,8 +110,9 @@ class Tracer {
     bool trace(const Target& target, std::uint64_t index, std::uint32_t view,
                std::vector<Photon>& arrivals, PhotonBalance& balance) const {
         const PathSampler sampler(target.key, static_cast<std::uint32_t>(index));
-        const Vec2f on_light =
-            scene_.lights().needs_position(target.light) ? sampler.pair(0, 1) : Vec2f(0.5f, 0.5f);
+        const Vec2f on_light = scene_.lights().needs_position(target.light)
+                                   ? sampler.further_pair(0)
+                                   : Vec2f(0.5f, 0.5f);
         const EmittedRay emitted = scene_.lights().emit(
             target.light, target.sphere, sampler.pair(0, 0), on_light, scene_.bounding_sphere());
         ++balance.shot;

@@ -150,5 +150,21 @@ TEST(PathTracer, ClearGlassVanishesInAFurnace) {
     EXPECT_NEAR(mean_radiance(image.radiance), 1.0, 0.002);
 }
 
+TEST(PathSampler, PlacesAndDirectionsAreSpreadTogether) {
+    // Sobol's first four dimensions are a (3, 11, 4)-net: eight of 2^11 points in each of 4^4
+    // boxes.
+    std::vector<int> count(256, 0);
+    for (std::uint32_t i = 0; i < 2048; ++i) {
+        const PathSampler sampler(77, i);
+        const Vec2f a = sampler.pair(0, 0), b = sampler.further_pair(0);
+        std::size_t box = 0;
+        for (const float u : {a.x(), a.y(), b.x(), b.y()}) {
+            box = 4 * box + static_cast<std::size_t>(4 * u);
+        }
+        ++count[box];
+    }
+    for (const int n : count) EXPECT_EQ(n, 8);
+}
+
 }  // namespace
 }  // namespace vitrine

@@ -29,6 +29,12 @@ class PathSampler {
         return {static_cast<float>(bits >> 40) * 0x1p-24f,
                 static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
     }
+    /// Two more dimensions of the same points, stratified together with `pair`: for quantities that
+    /// only act together, such as the place on a lamp and the direction from there. First vertex.
+    Vec2f further_pair(int purpose) const {
+        const auto key = static_cast<std::uint32_t>(key_of(0, purpose));
+        return {scrambled_sobol(index_, 2, key), scrambled_sobol(index_, 3, key)};
+    }
     /// The first of the pair.
     float number(int depth, int purpose) const {
         const std::uint64_t key = key_of(depth, purpose);
