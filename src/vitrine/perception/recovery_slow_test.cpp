@@ -106,13 +106,13 @@ TEST(Recovery, OfOtherStudies) {
           Case{.name = "span 0.2 (20 lambda)", .span = 0.2},
           Case{.name = "2 % lapses", .lapse = 0.02}, Case{.name = "5 % lapses", .lapse = 0.05},
           Case{.name = "curved, power 1.5, single", .power = 1.5},
-          Case{.name = "curved, power 1.5, 8 pooled", .power = 1.5, .observers = 8},
-          // The smooth scale rounds off the steepest end of a strongly curved one.
-          Case{.name = "curved, power 2, 8 pooled",
-          .power = 2,
+          // A curve between a line and a parabola is taken for a parabola, too steep at its end.
+          Case{.name = "curved, power 1.5, 8 pooled",
+          .power = 1.5,
           .observers = 8,
-          .median_within = 0.15,
-          .least_coverage = 0.5}}) {
+          .median_within = 0.12,
+          .least_coverage = 0.75},
+          Case{.name = "curved, power 2, 8 pooled", .power = 2, .observers = 8}}) {
         const Recovery r = recover(c, 300, 300);
         EXPECT_NEAR(r.median, 1.0, c.median_within) << c.name;
         EXPECT_GE(r.coverage, c.least_coverage) << c.name;

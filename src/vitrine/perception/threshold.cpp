@@ -11,23 +11,11 @@
 namespace vitrine {
 namespace {
 
-double cube_above(double t, double knot) {
-    const double d = std::max(0.0, t - knot);
-    return d * d * d;
-}
-
-/// Knots at equal steps through the stimuli, so that each piece holds as many of them.
-std::vector<double> knots_through(std::span<const double> stimuli, int degrees_of_freedom) {
-    const double begin = stimuli.front(), span = stimuli.back() - stimuli.front();
-    std::vector<double> knots;
-    for (int k = 0; k <= degrees_of_freedom; ++k) {
-        const double at =
-            static_cast<double>(k) / degrees_of_freedom * static_cast<double>(stimuli.size() - 1);
-        const auto i = std::min(static_cast<std::size_t>(at), stimuli.size() - 2);
-        const double f = at - static_cast<double>(i);
-        knots.push_back(((1 - f) * stimuli[i] + f * stimuli[i + 1] - begin) / span);
-    }
-    return knots;
+/// t^k on [0, 1], continued straight beyond its ends.
+double power(double t, int k) {
+    if (k == 1) return t;
+    if (t <= 0) return 0.0;
+    return t <= 1 ? std::pow(t, k) : 1 + k * (t - 1);
 }
 
 /// Log-likelihood to be gained by one scoring step: g' H^-1 g / 2.
@@ -40,45 +28,28 @@ double score_gain(const Eigen::MatrixXd& design, const Eigen::VectorXd& score,
 
 }  // namespace
 
-SmoothScale::SmoothScale(double begin, double end, std::vector<double> knots)
-    : begin_(begin), end_(end), knots_(std::move(knots)) {
-    VITRINE_CHECK_GE(knots_.size(), std::size_t{2});
-    coefficients = Eigen::VectorXd::Zero(degrees_of_freedom());
+SmoothScale::SmoothScale(double begin, double end, int degree)
+    : coefficients(Eigen::VectorXd::Zero(degree)), begin_(begin), end_(end) {
+    VITRINE_CHECK_GE(degree, 1);
 }
 
 Eigen::VectorXd SmoothScale::basis(double n) const {
-    // Hastie, Tibshirani, Friedman 2009, eq. 5.4 and 5.5: N_1 = t, N_{k+1} = d_k - d_{K-1}. Beyond
-    // the last knot the cubes cancel to a straight line.
     const double t = (n - begin_) / (end_ - begin_);
-    const std::size_t last = knots_.size() - 1;
     Eigen::VectorXd values(degrees_of_freedom());
-    values[0] = t;
-    if (values.size() == 1) return values;
-    const auto d = [&](std::size_t k) {
-        return (cube_above(t, knots_[k]) - cube_above(t, knots_[last])) /
-               (knots_[last] - knots_[k]);
-    };
-    const double d_last = d(last - 1);
-    for (std::size_t k = 0; k + 1 < last; ++k) {
-        values[static_cast<Eigen::Index>(k) + 1] = d(k) - d_last;
-    }
+    for (int k = 1; k <= degrees_of_freedom(); ++k) values[k - 1] = power(t, k);
     return values;
 }
 
 double SmoothScale::beta(double n) const {
-    // The dot product of `basis` without its storage: this is the inner loop of a bootstrap.
+    // The dot product of `basis` by Horner's rule: this is the inner loop of a bootstrap.
     const double t = (n - begin_) / (end_ - begin_);
-    const std::size_t last = knots_.size() - 1;
-    double sum = coefficients[0] * t;
-    if (last == 1) return sum;
-    const double cube_last = cube_above(t, knots_[last]);
-    const double d_last =
-        (cube_above(t, knots_[last - 1]) - cube_last) / (knots_[last] - knots_[last - 1]);
-    for (std::size_t k = 0; k + 1 < last; ++k) {
-        const double d = (cube_above(t, knots_[k]) - cube_last) / (knots_[last] - knots_[k]);
-        sum += coefficients[static_cast<Eigen::Index>(k) + 1] * (d - d_last);
+    const double inside = std::clamp(t, 0.0, 1.0);
+    double value = 0, slope = 0;
+    for (int k = degrees_of_freedom(); k >= 1; --k) {
+        slope = slope * inside + k * coefficients[k - 1];
+        value = (value + coefficients[k - 1]) * inside;
     }
-    return sum;
+    return value + slope * (t - inside);
 }
 
 SmoothFitter::SmoothFitter(const QuestionCells& cells, std::span<const double> stimuli,
@@ -87,7 +58,7 @@ SmoothFitter::SmoothFitter(const QuestionCells& cells, std::span<const double> s
     VITRINE_CHECK_EQ(static_cast<int>(stimuli.size()), cells.stimulus_count);
     const int most = std::min(options.max_degrees_of_freedom, cells.stimulus_count - 2);
     for (int df = 1; df <= std::max(1, most); ++df) {
-        SmoothScale candidate(stimuli.front(), stimuli.back(), knots_through(stimuli, df));
+        SmoothScale candidate(stimuli.front(), stimuli.back(), df);
         Eigen::MatrixXd at_stimuli(cells.stimulus_count - 1, df);
         const Eigen::VectorXd origin = candidate.basis(stimuli.front());
         for (int i = 1; i < cells.stimulus_count; ++i) {
@@ -110,8 +81,8 @@ SmoothScale SmoothFitter::fit(const Eigen::VectorXd& ones) const {
         weight[i] = answers_[i] * a.information();
     }
     for (std::size_t i = 1; i < candidates_.size(); ++i) {
-        // Every spline contains the line, so its score test there (Rao 1948) foretells the gain in
-        // log-likelihood. Half of what the criterion asks is no hope worth a fit.
+        // Every polynomial contains the line, so its score test there (Rao 1948) foretells the gain
+        // in log-likelihood. Half of what the criterion asks is no hope worth a fit.
         constexpr double kHopeless = 0.5;
         const double needed = gain_per_parameter * static_cast<double>(i);
         if (score_gain(designs_[i], score, weight) < kHopeless * needed) continue;

@@ -18,12 +18,14 @@ namespace vitrine {
 /// Change of beta with d' = 1.
 constexpr double kBetaPerThreshold = 0.5;
 
-/// A smooth scale over the physical variable: a natural cubic spline with few degrees of freedom
-/// (1 = a straight line), fitted to the answers themselves and not to fitted points.
+/// A smooth scale over the physical variable: a polynomial with few degrees of freedom (1 = a
+/// straight line) that is 0 at the first stimulus, fitted to the answers themselves and not to
+/// fitted points. A natural spline's ends are straight, which takes a tenth off the slope of a
+/// quadratic scale where it is steepest.
 class SmoothScale {
   public:
-    SmoothScale(double begin, double end, std::vector<double> knots);
-    int degrees_of_freedom() const { return static_cast<int>(knots_.size()) - 1; }
+    SmoothScale(double begin, double end, int degree);
+    int degrees_of_freedom() const { return static_cast<int>(coefficients.size()); }
     double begin() const { return begin_; }
     double end() const { return end_; }
     /// Values of the basis at n; linear beyond the ends. The constant is left out: differences
@@ -38,7 +40,6 @@ class SmoothScale {
 
   private:
     double begin_, end_;
-    std::vector<double> knots_;  ///< on [0, 1]
 };
 
 struct SmoothOptions {
