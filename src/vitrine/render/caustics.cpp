@@ -402,7 +402,7 @@ CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather
         maps.secondary.push_back({photon.position, photon.normal.unpack(), flux, photon.views});
         weights.push_back(luminance(flux));
     }
-    if (!weights.empty()) maps.secondary_choice.emplace(weights);
+    if (!weights.empty()) maps.secondary_choice = GuidedChoice(weights);
     maps.near_m = kNearFactor * radius;
     return maps;
 }

@@ -8,10 +8,9 @@
 #pragma once
 
 #include "base/progress.h"
+#include "render/guided_choice.h"
 #include "render/photon_grid.h"
 #include "render/render_scene.h"
-
-#include <optional>
 
 namespace vitrine {
 
@@ -69,7 +68,7 @@ struct CausticMaps {
     PhotonGrid wide;
     PhotonGrid broad;
     std::vector<SecondaryLight> secondary;
-    std::optional<DiscreteDistribution> secondary_choice;
+    GuidedChoice secondary_choice;
     float near_m = 0.0f;
     bool empty() const { return sharp.empty() && soft.empty(); }
 };

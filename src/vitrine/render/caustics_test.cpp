@@ -304,12 +304,11 @@ TEST(CausticMaps, SecondaryLightsAreChosenByTheirFlux) {
     for (const SecondaryLight& light : maps.secondary) sum += luminance(light.flux);
     for (std::size_t i = 0; i < 30; ++i) {
         expected[i] = kDraws * luminance(maps.secondary[i].flux) / sum;
-        EXPECT_NEAR(maps.secondary_choice->probability(i) * kDraws, expected[i],
-                    1e-4 * expected[i]);
+        EXPECT_NEAR(maps.secondary_choice.probability(i) * kDraws, expected[i], 1e-4 * expected[i]);
     }
     for (int k = 0; k < kDraws; ++k) {
         float u = rng.next_float();
-        observed[maps.secondary_choice->sample(u)] += 1;
+        observed[maps.secondary_choice.pick(u)] += 1;
     }
     EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
 }

@@ -1,26 +1,17 @@
 #include "render/differential.h"
 
 #include "base/parallel.h"
+#include "image/filter.h"
+#include "render/pixel_samples.h"
 #include "render/sample_plan.h"
+#include "render/soft_light.h"
 
 namespace vitrine {
 namespace {
 
-/// Sums over the samples of one pixel.
-struct PixelSums {
-    Rgbd with = Rgbd::Zero(), without = Rgbd::Zero(), object = Rgbd::Zero();
-    std::array<Rgbd, kLayerCount> delta;
-    double change = 0, change_square = 0;  // luminance of what the composite gets
-    int count = 0, covered = 0;
-    PixelSums() { delta.fill(Rgbd::Zero()); }
-
-    /// Variance of the mean change.
-    double variance() const {
-        if (count < 2) return 0;
-        const double mean = change / count;
-        return std::max(0.0, change_square / count - mean * mean) / (count - 1);
-    }
-};
+/// Shadow rays to a lamp with size, where the change is noisy: penumbras are the noise, and a
+/// camera ray costs more than they do.
+constexpr int kLightSamples = 4;
 
 RenderScene combine(Scene real, std::vector<Part> virtual_parts) {
     for (Part& part : virtual_parts) {
@@ -30,71 +21,129 @@ RenderScene combine(Scene real, std::vector<Part> virtual_parts) {
     return RenderScene(std::move(real));
 }
 
-class FrameRenderer {
-  public:
-    /// @param maps of the progressive passes: the samples of a pixel take turns
-    FrameRenderer(const RenderScene& scene, const std::vector<CausticMaps>& maps,
-                  const TranslucentLight& translucent, const Camera& camera,
-                  const DifferentialOptions& options)
-        : scene_(scene),
-          camera_(camera),
-          origin_(camera.centre_in_world().cast<float>()),
-          seed_(options.seed) {
-        for (const CausticMaps& m : maps) {
-            tracers_.emplace_back(scene, m.empty() ? nullptr : &m, options.paths, &translucent);
-        }
-    }
+/// The soft light of each pixel's real surface, or of its virtual one, with that of its neighbours.
+Image<SoftPixel> average_soft(const Image<PixelSums>& sums, SoftSums PixelSums::*of,
+                              const Camera& camera) {
+    Image<SoftPixel> pixels(sums.width(), sums.height(), SoftPixel{});
+    parallel_for(sums.size(), 4096, [&](std::size_t i) {
+        const PixelSums& s = sums[i];
+        const SoftSums& soft = s.*of;
+        if (soft.seen == 0) return;
+        SoftPixel& pixel = pixels[i];
+        pixel.position = soft.position / static_cast<float>(soft.seen);
+        pixel.normal = soft.normal.normalized();
+        if (soft.count == 0) return;
+        const auto n = static_cast<float>(soft.count);
+        pixel.value = {soft.with / n, soft.shadow / n, soft.diffuse / n, 1 / n, n};
+        pixel.inverse_distance_sum = soft.inverse_distance;
+        pixel.hits = soft.hits;
+    });
+    average_soft_light(pixels, camera);
+    return pixels;
+}
 
-    void add_samples(int x, int y, int target, PixelSums& sums) const {
-        for (; sums.count < target; ++sums.count) {
-            const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
-            const PathTracer& tracer =
-                tracers_[static_cast<std::size_t>(sums.count) % tracers_.size()];
-            const PathResult with = tracer.trace(origin_, direction, sampler, kAllParts);
-            const Rgb with_total = with.total();
-            sums.with += with_total.cast<double>();
-            if (!with.is_touched) {
-                sums.without += with_total.cast<double>();
-                continue;
-            }
-            const PathResult without = tracer.trace(origin_, direction, sampler, kRealParts);
-            const Rgb without_total = without.total();
-            sums.without += without_total.cast<double>();
-            double change = 0;
-            if (with.first_part >= 0 && scene_.is_virtual(with.first_part)) {
-                ++sums.covered;
-                sums.object += with_total.cast<double>();
-                change = luminance(with_total) - luminance(without_total);
-            } else {
-                for (std::size_t k = 0; k < kLayerCount; ++k) {
-                    sums.delta[k] += (with.layers[k] - without.layers[k]).cast<double>();
-                }
-                change = luminance(Rgb(with_total - without_total));
-            }
-            sums.change += change;
-            sums.change_square += change * change;
-        }
-    }
-
-  private:
-    const RenderScene& scene_;
-    std::vector<PathTracer> tracers_;
-    const Camera& camera_;
-    Vec3f origin_;
-    std::uint64_t seed_;
+struct SoftImages {
+    Image<SoftPixel> real, virtual_parts;
 };
 
-/// Samples each pixel should get so that its standard error falls below `target`.
-Image<int> plan_change(const Image<PixelSums>& sums, double target, int max_samples,
-                       int map_count) {
+SoftImages average_soft(const Image<PixelSums>& sums, const Camera& camera) {
+    return {average_soft(sums, &PixelSums::soft_real, camera),
+            average_soft(sums, &PixelSums::soft_virtual, camera)};
+}
+
+/// Samples each pixel should get, and how many of them with soft light.
+struct Plan {
+    Image<int> sharp, soft;
+};
+
+/// Of a picture's width.
+constexpr double kSurroundings = 0.0125;
+
+/// Of the change of soft light by one path, over the surroundings of each pixel: few paths meet
+/// the brightest places, and where none of them has yet the noise is not smaller.
+ImageF soft_variance_around(const Image<PixelSums>& sums) {
+    ImageF variance(sums.width(), sums.height());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const PixelSums& s = sums[i];
+        variance[i] = static_cast<float>(s.soft_count) *
+                      variance_of_mean(s.soft_change, s.soft_change_square, s.soft_count);
+    }
+    return gaussian_blur(variance, std::max(1.0, kSurroundings * sums.width()));
+}
+
+/// Variance wanted of each pixel: its standard error is the target's share of the picture's mean
+/// or of its own level, whichever is brighter.
+ImageF wanted_variance(const Image<PixelSums>& sums, double target) {
+    ImageF wanted(sums.width(), sums.height());
+    double mean = 0;
+    for (const PixelSums& s : sums) mean += luminance(s.without) / static_cast<float>(s.count);
+    mean /= static_cast<double>(sums.size());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const double level = luminance(sums[i].with) / static_cast<float>(sums[i].count);
+        const double error = std::max(1e-9, target * std::hypot(mean, level));
+        wanted[i] = static_cast<float>(error * error);
+    }
+    return wanted;
+}
+
+Image<int> plan_sharp(const Image<PixelSums>& sums, const DifferentialOptions& options, int limit,
+                      int map_count) {
     ImageF variance(sums.width(), sums.height());
     Image<int> count(sums.width(), sums.height());
     for (std::size_t i = 0; i < sums.size(); ++i) {
-        variance[i] = static_cast<float>(sums[i].variance());
+        variance[i] = sums[i].sharp_variance();
         count[i] = sums[i].count;
     }
-    const ImageF wanted(sums.width(), sums.height(), static_cast<float>(target * target));
-    return plan_samples(variance, count, wanted, max_samples, map_count);
+    return plan_samples(variance, count, wanted_variance(sums, options.noise_target),
+                        std::min(limit, options.max_samples), map_count);
+}
+
+/// @param soft whose variance is that of the mean over neighbours, per variance of one path
+Image<int> plan_soft(const Image<PixelSums>& sums, const SoftImages& soft,
+                     const DifferentialOptions& options) {
+    // The errors of soft light lie in patches, which are seen sooner than grain.
+    constexpr double kSoftShare = 0.5;
+    const ImageF wanted = wanted_variance(sums, kSoftShare * options.noise_target);
+    const ImageF variance = soft_variance_around(sums);
+    Image<int> plan(sums.width(), sums.height());
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const float share =
+            std::max(soft.real[i].value.variance, soft.virtual_parts[i].value.variance);
+        const auto count = static_cast<float>(sums[i].soft_count);
+        const float samples = count * variance[i] * share / wanted[i];
+        const float most = std::max(static_cast<float>(options.max_samples), count);
+        plan[i] = static_cast<int>(std::clamp(samples, count, most));
+    }
+    return plan;
+}
+
+/// The pixels' means.
+void fill(const Image<PixelSums>& sums, const SoftImages& soft, DifferentialImage& image) {
+    const int width = sums.width(), height = sums.height();
+    for (ImageRgb* layer : {&image.with, &image.without, &image.shadow, &image.caustics,
+                            &image.reflection, &image.refraction, &image.diffuse, &image.object}) {
+        *layer = ImageRgb(width, height);
+    }
+    image.coverage = ImageF(width, height);
+    ImageRgb* layers[kLayerCount] = {&image.shadow, &image.caustics, &image.reflection,
+                                     &image.refraction, &image.diffuse};
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const PixelSums& s = sums[i];
+        const SoftValue &real = soft.real[i].value, &object = soft.virtual_parts[i].value;
+        const auto n = static_cast<float>(s.count);
+        const auto seen = static_cast<float>(s.count - s.covered);
+        const Rgb real_albedo = s.soft_real.albedo / n;
+        const Rgb of_object = s.soft_virtual.albedo / n * object.with;
+        image.with[i] = s.with / n + real_albedo * real.with + of_object;
+        image.without[i] = s.without / n + real_albedo * (real.with - real.shadow - real.diffuse) +
+                           s.hidden / static_cast<float>(std::max(1, s.soft_count));
+        image.object[i] = s.object / n + of_object;
+        image.coverage[i] = static_cast<float>(s.covered) / n;
+        if (seen <= 0) continue;
+        for (std::size_t k = 0; k < kLayerCount; ++k) (*layers[k])[i] = s.delta[k] / seen;
+        image.shadow[i] += real_albedo * real.shadow * (n / seen);
+        image.diffuse[i] += real_albedo * real.diffuse * (n / seen);
+    }
 }
 
 }  // namespace
@@ -102,8 +151,8 @@ Image<int> plan_change(const Image<PixelSums>& sums, double target, int max_samp
 DifferentialOptions preview_options() {
     DifferentialOptions options;
     options.min_samples = 1;
-    options.max_samples = 4;
-    options.noise_target = 0.03;
+    options.min_soft_samples = 1;
+    options.max_samples = 1;
     options.photon_count = 150'000;
     options.photon_passes = 1;
     options.paths.max_diffuse_bounces = 1;
@@ -167,53 +216,39 @@ void DifferentialRenderer::trace_photons(std::span<const Camera> cameras,
 DifferentialImage DifferentialRenderer::render(const Camera& camera,
                                                const Progress& progress) const {
     const int width = camera.width, height = camera.height;
-    const FrameRenderer renderer(scene_, maps_, translucent_, camera, options_);
+    const PixelSampler renderer(scene_, maps_, translucent_, camera, options_.paths, options_.seed);
     Image<PixelSums> sums(width, height, PixelSums{});
+    Plan plan{Image<int>(width, height, options_.min_samples),
+              Image<int>(width, height, options_.min_soft_samples)};
     constexpr int kBand = 16;
-    const auto run = [&](const Progress& step, const auto& samples_of) {
+    const auto map_count = static_cast<int>(maps_.size());
+    const auto run = [&](const Progress& step, int light_samples) {
         for (int band = 0; band < height; band += kBand) {
             const auto rows = static_cast<std::size_t>(std::min(kBand, height - band));
             parallel_for(rows, 1, [&](std::size_t row) {
                 const int y = band + static_cast<int>(row);
                 for (int x = 0; x < width; ++x) {
-                    renderer.add_samples(x, y, samples_of(x, y), sums(x, y));
+                    renderer.add_samples(x, y, plan.sharp(x, y), plan.soft(x, y), light_samples,
+                                         sums(x, y));
                 }
             });
             step.update(static_cast<double>(band + static_cast<int>(rows)) / height, "insert");
         }
     };
-    run(progress.part(0, 0.3), [&](int, int) { return options_.min_samples; });
-    double mean = 0;
-    for (const PixelSums& s : sums) mean += luminance(Rgbd(s.without / s.count));
-    mean /= static_cast<double>(sums.size());
-    const double target = std::max(1e-12, options_.noise_target * mean);
+    run(progress.part(0, 0.3), 1);
     // Twice: the first answer rests on few samples.
-    for (int round = 0; round < 2; ++round) {
-        const int limit = round == 0 ? std::min(4 * options_.min_samples, options_.max_samples)
-                                     : options_.max_samples;
-        const Image<int> plan = plan_change(sums, target, limit, static_cast<int>(maps_.size()));
-        run(progress.part(round == 0 ? 0.3 : 0.5, round == 0 ? 0.5 : 1.0),
-            [&](int x, int y) { return plan(x, y); });
+    const int rounds = options_.max_samples > options_.min_samples ? 2 : 0;
+    for (int round = 0; round < rounds; ++round) {
+        if (round == 0) {
+            plan.soft = plan_soft(sums, average_soft(sums, camera), options_);
+            plan.sharp = plan_sharp(sums, options_, 4 * options_.min_samples, map_count);
+        } else {
+            plan.sharp = plan_sharp(sums, options_, options_.max_samples, map_count);
+        }
+        run(progress.part(round == 0 ? 0.3 : 0.6, round == 0 ? 0.6 : 0.95), kLightSamples);
     }
     DifferentialImage image;
-    for (ImageRgb* layer : {&image.with, &image.without, &image.shadow, &image.caustics,
-                            &image.reflection, &image.refraction, &image.diffuse, &image.object}) {
-        *layer = ImageRgb(width, height);
-    }
-    image.coverage = ImageF(width, height);
-    ImageRgb* layers[kLayerCount] = {&image.shadow, &image.caustics, &image.reflection,
-                                     &image.refraction, &image.diffuse};
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-        const PixelSums& s = sums[i];
-        image.with[i] = (s.with / s.count).cast<float>();
-        image.without[i] = (s.without / s.count).cast<float>();
-        image.object[i] = (s.object / s.count).cast<float>();
-        image.coverage[i] = static_cast<float>(s.covered) / static_cast<float>(s.count);
-        const int seen = s.count - s.covered;
-        for (std::size_t k = 0; k < kLayerCount; ++k) {
-            if (seen > 0) (*layers[k])[i] = (s.delta[k] / seen).cast<float>();
-        }
-    }
+    fill(sums, average_soft(sums, camera), image);
     image.geometry = render_geometry(scene_, camera);
     return image;
 }

@@ -14,9 +14,11 @@
 namespace vitrine {
 
 struct DifferentialOptions {
-    int min_samples = 16;   ///< paths per pixel everywhere, enough to see where work is needed
-    int max_samples = 128;  ///< paths per pixel where the change is noisy
-    double noise_target = 0.008;  ///< standard error per pixel, of the picture's mean luminance
+    int min_samples = 4;       ///< paths per pixel everywhere, enough to see where work is needed
+    int min_soft_samples = 2;  ///< those that go on from plain surfaces, see soft_light.h
+    int max_samples = 48;      ///< paths per pixel where the change is noisy
+    /// Standard error per pixel, of its own luminance or the picture's mean, whichever is brighter.
+    double noise_target = 0.008;
     std::uint64_t photon_count = 3'000'000;
     int photon_passes = 4;  ///< sets they come in, each with a smaller radius than the one before
     double gather_radius_m = 0;  ///< of the first; 0: half the width of a pixel (`pixel_radius`)

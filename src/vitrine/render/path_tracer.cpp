@@ -38,6 +38,7 @@ struct PathTracer::State {
     bool is_layer_fixed = false;      // seen by way of a reflection or refraction
     bool is_from_first = false;       // left the surface seen by its diffuse lobe
     bool is_diffuse_segment = false;  // straight from a receiver's diffuse lobe
+    bool is_soft = false;             // what comes now is soft light of the surface seen
     float pdf = 0;  // of `direction` at the last receiver; 0 for single directions
     Vec3f receiver = Vec3f::Zero();
 };
@@ -49,20 +50,29 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
     : scene_(scene), caustics_(caustics), options_(options), translucent_(translucent) {}
 
 PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
-                             const PathSampler& sampler, std::uint32_t view) const {
+                             const PathSampler& sampler, std::uint32_t view,
+                             const PathWish& wish) const {
     PathResult result;
     Pending pending;
     State first;
     first.origin = origin;
     first.direction = direction;
     pending.push(first);
-    finish(pending, sampler, view, result);
+    finish(pending, sampler, view, wish, result);
     return result;
 }
 
 void PathTracer::finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
-                        PathResult& result) const {
-    while (!pending.empty()) follow(pending.pop(), pending, sampler, view, result);
+                        const PathWish& wish, PathResult& result) const {
+    while (!pending.empty()) follow(pending.pop(), pending, sampler, view, wish, result);
+}
+
+void PathTracer::add(const State& state, Layer layer, const Rgb& radiance, PathResult& result) {
+    if (!state.is_soft) {
+        result.layers[static_cast<std::size_t>(layer)] += radiance;
+    } else {
+        (layer == Layer::Shadow ? result.soft.shadow : result.soft.diffuse) += radiance;
+    }
 }
 
 PathResult PathTracer::entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
@@ -73,19 +83,19 @@ PathResult PathTracer::entering(const ShadingPoint& point, float eta, const Path
     const Bsdf bsdf = EnteringBsdf{eta};
     const Frame frame(point.shading_normal);
     const Vec3f wo(0, 0, 1);
-    add_direct(state, point, bsdf, frame, wo, sampler, view, result);
+    add_direct(state, point, bsdf, frame, wo, sampler, view, 1, result);
     if (options_.direct_light_only) return result;
     add_secondary(state, point, bsdf, sampler, view, result);
     if (scatter(state, point, bsdf, frame, wo, sampler)) {
         Pending pending;
         pending.push(state);
-        finish(pending, sampler, view, result);
+        finish(pending, sampler, view, {}, result);
     }
     return result;
 }
 
 void PathTracer::follow(State state, Pending& pending, const PathSampler& sampler,
-                        std::uint32_t view, PathResult& result) const {
+                        std::uint32_t view, const PathWish& wish, PathResult& result) const {
     while (true) {
         const Ray ray{state.origin, state.direction, 0.0f, 1e30f, view};
         const Hit hit = scene_.closest(ray);
@@ -97,6 +107,7 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
         }
         result.is_touched |= scene_.is_virtual(hit.part);
         if (state.depth == 0) result.first_part = hit.part;
+        if (state.is_soft && result.soft.hit_distance == 0) result.soft.hit_distance = hit.distance;
         const ShadingPoint point = scene_.surface(hit, state.direction);
         ++state.depth;
         if (scene_.dielectric(hit.part)) {
@@ -127,10 +138,20 @@ void PathTracer::follow(State state, Pending& pending, const PathSampler& sample
             state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
         }
         add_exitance(state, point, bsdf, wo, view, result);
-        add_direct(state, point, bsdf, frame, wo, sampler, view, result);
+        add_direct(state, point, bsdf, frame, wo, sampler, view,
+                   state.has_receiver ? 1 : wish.light_samples, result);
         add_caustics(state, point, bsdf, frame, wo, view, result);
         if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
             return;
+        }
+        const auto* plain = std::get_if<DiffuseBsdf>(&bsdf);
+        if (plain && !state.has_receiver && !state.is_layer_fixed) {
+            result.soft.is_present = true;
+            result.soft.albedo = plain->albedo;
+            result.soft.position = point.position;
+            result.soft.normal = point.shading_normal;
+            if (!wish.finds_soft) return;
+            state.is_soft = true;
         }
         add_secondary(state, point, bsdf, sampler, view, result);
         if (!scatter(state, point, bsdf, frame, wo, sampler)) return;
@@ -149,8 +170,7 @@ void PathTracer::add_emission(const State& state, float distance, PathResult& re
             weight =
                 balance(state.pdf, lights.pdf(i, state.receiver, state.direction, hit->distance));
         }
-        result.layers[static_cast<std::size_t>(state.layer)] +=
-            state.throughput * hit->radiance * weight;
+        add(state, state.layer, state.throughput * hit->radiance * weight, result);
     }
 }
 
@@ -169,7 +189,7 @@ void PathTracer::add_environment(const State& state, PathResult& result) const {
     }
     // An environment seen from the first surface is direct light, whatever its layer says by now.
     const Layer layer = state.is_from_first && !state.is_layer_fixed ? Layer::Shadow : state.layer;
-    result.layers[static_cast<std::size_t>(layer)] += state.throughput * radiance;
+    add(state, layer, state.throughput * radiance, result);
 }
 
 bool PathTracer::is_hidden(const Ray& ray, std::uint32_t view, PathResult& result) const {
@@ -184,7 +204,7 @@ bool PathTracer::is_hidden(const Ray& ray, std::uint32_t view, PathResult& resul
 
 void PathTracer::add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                             const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
-                            std::uint32_t view, PathResult& result) const {
+                            std::uint32_t view, int light_samples, PathResult& result) const {
     const LightSampler& lights = scene_.lights();
     if (lights.count() == 0) return;
     // All lights at the surface seen; one of them, by turns of chance, at those behind it.
@@ -201,32 +221,42 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
     const Vec3f origin = scene_.leave_smooth(point);
     for (std::size_t i = begin; i < end; ++i) {
         const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
-        const auto s = lights.sample(
-            i, origin,
-            lights.needs_position(i) ? sampler.pair(state.depth, use) : Vec2f(0.5f, 0.5f));
-        if (!s) continue;
-        const Vec3f wi = frame.to_local(s->direction);
-        if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
-        Rgb value = Rgb::Zero();
-        for (const Lobe lobe : {Lobe::Diffuse, Lobe::Glossy}) {
-            // Light that a glossy lobe sends on to an earlier receiver is among its photons.
-            if (lobe == Lobe::Glossy && caustics_ && state.has_receiver) continue;
-            const float probability = lobe_probability(bsdf, lobe);
-            if (probability <= 0) continue;
-            float weight = 1.0f;
-            const bool can_scatter =
-                !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces;
-            if (s->pdf > 0 && can_scatter) {
-                weight = balance(s->pdf, probability * pdf_lobe(bsdf, lobe, wo, wi));
-            }
-            value += weight * eval_lobe(bsdf, lobe, wo, wi);
+        const int count = lights.needs_position(i) ? light_samples : 1;
+        for (int k = 0; k < count; ++k) {
+            Vec2f u(0.5f, 0.5f);
+            if (lights.needs_position(i)) u = sampler.pair(state.depth, use, count, k);
+            const auto s = lights.sample(i, origin, u);
+            if (!s) continue;
+            const Vec3f wi = frame.to_local(s->direction);
+            if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
+            const Rgb value = direct_value(state, bsdf, wo, wi, s->pdf);
+            if (!(value > 0).any()) continue;
+            const Ray shadow{origin, s->direction, 0.0f, s->distance * (1 - 1e-4f), view};
+            if (is_hidden(shadow, view, result)) continue;
+            const float scale = boost * wi.z() / static_cast<float>(count);
+            add(state, state.layer, state.throughput * value * s->radiance_over_pdf * scale,
+                result);
         }
-        if (!(value > 0).any()) continue;
-        const Ray shadow{origin, s->direction, 0.0f, s->distance * (1 - 1e-4f), view};
-        if (is_hidden(shadow, view, result)) continue;
-        result.layers[static_cast<std::size_t>(state.layer)] +=
-            state.throughput * value * s->radiance_over_pdf * (boost * wi.z());
     }
+}
+
+Rgb PathTracer::direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
+                             float light_pdf) const {
+    Rgb value = Rgb::Zero();
+    const bool can_scatter =
+        !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces;
+    for (const Lobe lobe : {Lobe::Diffuse, Lobe::Glossy}) {
+        // Light that a glossy lobe sends on to an earlier receiver is among its photons.
+        if (lobe == Lobe::Glossy && caustics_ && state.has_receiver) continue;
+        const float probability = lobe_probability(bsdf, lobe);
+        if (probability <= 0) continue;
+        float weight = 1.0f;
+        if (light_pdf > 0 && can_scatter) {
+            weight = balance(light_pdf, probability * pdf_lobe(bsdf, lobe, wo, wi));
+        }
+        value += weight * eval_lobe(bsdf, lobe, wo, wi);
+    }
+    return value;
 }
 
 void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
@@ -264,7 +294,7 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
     const Layer layer = state.is_layer_fixed      ? state.layer
                         : state.is_first_receiver ? Layer::Caustics
                                                   : Layer::Diffuse;
-    result.layers[static_cast<std::size_t>(layer)] += state.throughput * reflected;
+    add(state, layer, state.throughput * reflected, result);
 }
 
 void PathTracer::add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
@@ -274,16 +304,16 @@ void PathTracer::add_exitance(const State& state, const ShadingPoint& point, con
     if (view == kAllParts) result.is_touched |= translucent_->is_touched(point.part);
     const Rgb exitance = translucent_->exitance(scene_, point, view);
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
-    result.layers[static_cast<std::size_t>(layer)] +=
-        state.throughput * exitance * (fresnel_transmittance(wo.z(), face->eta) / kPif);
+    add(state, layer,
+        state.throughput * exitance * (fresnel_transmittance(wo.z(), face->eta) / kPif), result);
 }
 
 void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                                const PathSampler& sampler, std::uint32_t view,
                                PathResult& result) const {
-    if (!caustics_ || !caustics_->secondary_choice) return;
-    float u = sampler.number(state.depth, kSecondaryUse);
-    const std::size_t index = caustics_->secondary_choice->sample(u);
+    if (!caustics_ || caustics_->secondary_choice.empty()) return;
+    const std::size_t index =
+        caustics_->secondary_choice.pick(sampler.number(state.depth, kSecondaryUse));
     const SecondaryLight& light = caustics_->secondary[index];
     const Vec3f origin = scene_.leave_smooth(point);
     const Vec3f to_light = light.position + scene_.epsilon() * light.normal - origin;
@@ -299,11 +329,10 @@ void PathTracer::add_secondary(const State& state, const ShadingPoint& point, co
     if (view == kAllParts) result.is_touched |= light.views != kAllParts;
     const auto wanted = static_cast<std::uint8_t>(view == kAllParts ? kVirtualParts : kRealParts);
     if (!(light.views & wanted)) return;
-    const auto probability = static_cast<float>(caustics_->secondary_choice->probability(index));
+    const auto probability = static_cast<float>(caustics_->secondary_choice.probability(index));
     const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
-    result.layers[static_cast<std::size_t>(layer)] +=
-        state.throughput * value * light.flux * geometry;
+    add(state, layer, state.throughput * value * light.flux * geometry, result);
 }
 
 bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf,

@@ -32,12 +32,26 @@ struct PathOptions {
     bool direct_light_only = false;  ///< leave out what other surfaces scatter and the environment
 };
 
+/// What other surfaces and the environment send to a plain diffuse surface that is seen without
+/// glass or mirrors in between: varies slowly along it, and is known apart from its albedo.
+struct SoftLight {
+    bool is_present = false;    ///< such a surface is seen
+    Rgb shadow = Rgb::Zero();   ///< reflected radiance, of Layer::Shadow: the environment's
+    Rgb diffuse = Rgb::Zero();  ///< of Layer::Diffuse
+    Rgb albedo = Rgb::Zero();
+    Vec3f position = Vec3f::Zero();
+    Vec3f normal = Vec3f::Zero();
+    float hit_distance = 0;  ///< to the surface that sends the light; 0: none met
+};
+
 struct PathResult {
-    std::array<Rgb, kLayerCount> layers;
+    std::array<Rgb, kLayerCount> layers;  ///< without the soft light
+    SoftLight soft;
     bool is_touched = false;  ///< a virtual part had a say in it
     int first_part = -1;      ///< met by the camera ray itself; -1: none
     PathResult() { layers.fill(Rgb::Zero()); }
-    Rgb total() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
+    Rgb sharp() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
+    Rgb total() const { return sharp() + soft.shadow + soft.diffuse; }
 };
 
 /// Sample `index` of a pixel: a ray through a place in its square, and the path's random numbers.
@@ -55,6 +69,12 @@ inline CameraSample camera_sample(const Camera& camera, std::uint64_t seed, int 
     return {sampler, ray.cast<float>()};
 }
 
+/// What one path is asked for.
+struct PathWish {
+    bool finds_soft = true;  ///< false: leaves the soft light out, for a fraction of the cost
+    int light_samples = 1;   ///< shadow rays to each lamp with size, from the surface seen
+};
+
 class PathTracer {
   public:
     /// @param caustics may be null: the reference; kept by reference, as is the scene
@@ -64,7 +84,7 @@ class PathTracer {
 
     /// @param view kAllParts for the scene with its virtual parts, kRealParts for the one without
     PathResult trace(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
-                     std::uint32_t view) const;
+                     std::uint32_t view, const PathWish& wish = {}) const;
 
     /// Irradiance / pi that enters a translucent body at `point` along one path. Photons that land
     /// on it are left out: they are known one by one.
@@ -75,12 +95,16 @@ class PathTracer {
     struct State;
     struct Pending;
     void follow(State state, Pending& pending, const PathSampler& sampler, std::uint32_t view,
-                PathResult& result) const;
+                const PathWish& wish, PathResult& result) const;
+    static void add(const State& state, Layer layer, const Rgb& radiance, PathResult& result);
     void add_emission(const State& state, float distance, PathResult& result) const;
     void add_environment(const State& state, PathResult& result) const;
     void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                     const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
-                    std::uint32_t view, PathResult& result) const;
+                    std::uint32_t view, int light_samples, PathResult& result) const;
+    /// Of the lobes towards a light that was picked with a density (0: a light without size).
+    Rgb direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
+                     float light_pdf) const;
     void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                       const Frame& frame, const Vec3f& wo, std::uint32_t view,
                       PathResult& result) const;
@@ -89,7 +113,7 @@ class PathTracer {
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                        const PathSampler& sampler, std::uint32_t view, PathResult& result) const;
     void finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
-                PathResult& result) const;
+                const PathWish& wish, PathResult& result) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
     bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,

@@ -40,7 +40,7 @@ Vec3f PackedDirection::unpack() const {
 
 PhotonGrid::PhotonGrid(const std::vector<Photon>& photons, float radius_m)
     : radius_(radius_m), inverse_cell_(0.5f / radius_m) {
-    std::uint32_t buckets = 1;
+    std::uint32_t buckets = 8;
     while (buckets < photons.size() && buckets < (1u << 24)) buckets *= 2;
     bucket_mask_ = buckets - 1;
     start_.assign(std::size_t{buckets} + 1, 0);

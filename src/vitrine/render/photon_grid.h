@@ -59,16 +59,24 @@ class PhotonGrid {
         const Eigen::Vector3i low = scaled.array().floor().cast<int>();
         const float radius2 = radius_ * radius_;
         const float scale = 2.0f / (kPif * radius2);
-        std::uint32_t visited[8];
-        int visited_count = 0;
+        // The look-ups wait for memory, not for each other: all buckets first, then all photons.
+        std::uint32_t bucket[8], begin[8], end[8];
+        int count = 0;
         for (int corner = 0; corner < 8; ++corner) {
-            const std::uint32_t bucket =
+            bucket[corner] =
                 bucket_of(low + Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2));
+        }
+        for (int corner = 0; corner < 8; ++corner) {
             bool is_repeated = false;  // two cells in one bucket must not count twice
-            for (int k = 0; k < visited_count; ++k) is_repeated |= visited[k] == bucket;
-            if (is_repeated) continue;
-            visited[visited_count++] = bucket;
-            for (std::uint32_t i = start_[bucket]; i < start_[bucket + 1]; ++i) {
+            for (int k = 0; k < corner; ++k) is_repeated |= bucket[k] == bucket[corner];
+            const std::uint32_t first = start_[bucket[corner]], last = start_[bucket[corner] + 1];
+            if (first == last || is_repeated) continue;
+            __builtin_prefetch(&photons_[first]);
+            begin[count] = first;
+            end[count++] = last;
+        }
+        for (int k = 0; k < count; ++k) {
+            for (std::uint32_t i = begin[k]; i < end[k]; ++i) {
                 const Photon& photon = photons_[i];
                 const Vec3f d = photon.position - position;
                 const float distance2 = d.squaredNorm();
@@ -85,11 +93,14 @@ class PhotonGrid {
     static constexpr float kMaxHeight = 0.5f;     // of the radius: tolerates curved receivers
     static constexpr float kMinNormalCos = 0.5f;  // 60 degrees: across an edge is another face
 
+    /// Blocks of 2 x 2 x 2 cells lie side by side in memory: a query touches three on average.
     std::uint32_t bucket_of(const Eigen::Vector3i& cell) const {
-        const std::uint32_t hash = static_cast<std::uint32_t>(cell.x()) * 73856093u ^
-                                   static_cast<std::uint32_t>(cell.y()) * 19349663u ^
-                                   static_cast<std::uint32_t>(cell.z()) * 83492791u;
-        return (hash ^ hash >> 15) & bucket_mask_;
+        const std::uint32_t hash = static_cast<std::uint32_t>(cell.x() >> 1) * 73856093u ^
+                                   static_cast<std::uint32_t>(cell.y() >> 1) * 19349663u ^
+                                   static_cast<std::uint32_t>(cell.z() >> 1) * 83492791u;
+        const auto corner =
+            static_cast<std::uint32_t>((cell.x() & 1) | (cell.y() & 1) << 1 | (cell.z() & 1) << 2);
+        return ((hash ^ hash >> 15) << 3 | corner) & bucket_mask_;
     }
 
     std::vector<Photon> photons_;       // sorted by bucket, input order within

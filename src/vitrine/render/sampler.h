@@ -35,6 +35,13 @@ class PathSampler {
         const auto key = static_cast<std::uint32_t>(key_of(0, purpose));
         return {scrambled_sobol(index_, 2, key), scrambled_sobol(index_, 3, key)};
     }
+    /// Pair `k` of `count` that this sample takes instead of one: all samples that take as many go
+    /// through the sequence together.
+    Vec2f pair(int depth, int purpose, int count, int k) const {
+        PathSampler part = *this;
+        part.index_ = index_ * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(k);
+        return part.pair(depth, purpose);
+    }
     /// The first of the pair.
     float number(int depth, int purpose) const {
         const std::uint64_t key = key_of(depth, purpose);

@@ -1,0 +1,101 @@
+#include "render/pixel_samples.h"
+
+namespace vitrine {
+namespace {
+
+/// Below this albedo a surface shows nothing of the light on it.
+constexpr float kLeastAlbedo = 1e-3f;
+
+/// Samples whose mean is one value of a pixel's spread.
+constexpr int kBlock = 2;
+
+}  // namespace
+
+float variance_of_mean(float sum, float square_sum, int count) {
+    if (count < 2) return 0;
+    const float mean = sum / static_cast<float>(count);
+    return std::max(0.0f, square_sum / static_cast<float>(count) - mean * mean) /
+           static_cast<float>(count - 1);
+}
+
+float PixelSums::sharp_variance() const {
+    const int blocks = count / kBlock;
+    return variance_of_mean(change, block_square, blocks) / float(kBlock * kBlock);
+}
+
+PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMaps>& maps,
+                           const TranslucentLight& translucent, const Camera& camera,
+                           const PathOptions& paths, std::uint64_t seed)
+    : scene_(scene), camera_(camera), origin_(camera.centre_in_world().cast<float>()), seed_(seed) {
+    for (const CausticMaps& m : maps) {
+        tracers_.emplace_back(scene, m.empty() ? nullptr : &m, paths, &translucent);
+    }
+}
+
+void PixelSampler::add_samples(int x, int y, int target, int soft_target, int light_samples,
+                               PixelSums& sums) const {
+    for (; sums.count < std::max(target, soft_target); ++sums.count) {
+        const bool finds_soft = sums.soft_count < soft_target;
+        add_sample(x, y, {finds_soft, finds_soft ? 1 : light_samples}, sums);
+        sums.soft_count += finds_soft ? 1 : 0;
+    }
+}
+
+void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sums) const {
+    const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
+    // Neighbours begin with different passes: soft light is averaged over them.
+    const auto turn = static_cast<std::size_t>(sums.count + x + 2 * y);
+    const PathTracer& tracer = tracers_[turn % tracers_.size()];
+    const PathResult with = tracer.trace(origin_, direction, sampler, kAllParts, wish);
+    const PathResult without =
+        with.is_touched ? tracer.trace(origin_, direction, sampler, kRealParts, wish) : with;
+    const bool is_covered = with.first_part >= 0 && scene_.is_virtual(with.first_part);
+    const Rgb sharp = with.sharp();
+    sums.with += sharp;
+    sums.without += without.sharp();
+    SoftSums& soft = is_covered ? sums.soft_virtual : sums.soft_real;
+    const Rgb soft_with = with.soft.shadow + with.soft.diffuse;
+    const Rgb soft_without = without.soft.shadow + without.soft.diffuse;
+    if (with.soft.is_present) {
+        ++soft.seen;
+        soft.albedo += with.soft.albedo;
+        soft.position += with.soft.position;
+        soft.normal += with.soft.normal;
+    }
+    if (wish.finds_soft && with.soft.is_present) {
+        const Rgb scale = 1.0f / with.soft.albedo.max(kLeastAlbedo);
+        ++soft.count;
+        soft.with += scale * soft_with;
+        if (!is_covered) {
+            soft.shadow += scale * (with.soft.shadow - without.soft.shadow);
+            soft.diffuse += scale * (with.soft.diffuse - without.soft.diffuse);
+        }
+        for (const PathResult* path : {&with, &without}) {
+            if (!(path->soft.hit_distance > 0)) continue;
+            ++soft.hits;
+            soft.inverse_distance += 1 / path->soft.hit_distance;
+        }
+    }
+    if (is_covered) {
+        ++sums.covered;
+        sums.object += sharp;
+        sums.hidden += soft_without;
+    } else if (with.is_touched) {
+        for (std::size_t k = 0; k < kLayerCount; ++k) {
+            sums.delta[k] += with.layers[k] - without.layers[k];
+        }
+    }
+    const float change = luminance(Rgb(sharp - without.sharp()));
+    sums.block += change;
+    if ((sums.count + 1) % kBlock == 0) {
+        sums.change += sums.block;
+        sums.block_square += sums.block * sums.block;
+        sums.block = 0;
+    }
+    if (!wish.finds_soft) return;
+    const float soft_change = luminance(is_covered ? soft_with : Rgb(soft_with - soft_without));
+    sums.soft_change += soft_change;
+    sums.soft_change_square += soft_change * soft_change;
+}
+
+}  // namespace vitrine
