@@ -10,6 +10,9 @@
 namespace vitrine::cli {
 namespace {
 
+/// Enough for the mean over neighbours to look smooth.
+constexpr double kSoftSamples = 8;
+
 struct RenderArguments {
     std::string scene, out, camera, method = "photons";
     double resolution = 1.0, white = 1.0;
@@ -47,6 +50,12 @@ void declare(CLI::App& command, RenderArguments& a) {
                     "Standard error to reach there, as a share of the pixel's level")
         ->check(CLI::PositiveNumber)
         ->group("Quality");
+    command
+        .add_option("--soft-samples-per-pixel", a.options.soft_samples_per_pixel,
+                    "Paths per pixel that look for light from other surfaces, whose mean is taken "
+                    "over neighbours; 0: all do, and no mean is taken")
+        ->check(CLI::Range(0.0, 1e6))
+        ->group("Quality");
     command.add_option("--photon-count", a.options.caustics.photon_count, "Photons shot")
         ->check(CLI::Range(1, 200'000'000))
         ->group("Quality");
@@ -69,12 +78,14 @@ void add_render_command(CLI::App& root) {
     CLI::App* command = root.add_subcommand("render", "Render a scene file");
     auto a = std::make_shared<RenderArguments>();
     a->options.caustics.gather_radius_m = 0.0;
+    a->options.soft_samples_per_pixel = kSoftSamples;
     declare(*command, *a);
     const auto common = add_common_options(*command);
     on_run(*command, common, [=] {
         const Scene scene = read_scene(a->scene);
         FinalOptions options = a->options;
         options.use_photons = a->method == "photons";
+        if (!options.use_photons) options.soft_samples_per_pixel = 0;
         options.seed = options.caustics.seed = common->seed;
         std::vector<Camera> cameras;
         for (const Camera& camera : scene.cameras) {

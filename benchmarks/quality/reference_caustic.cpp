@@ -182,6 +182,8 @@ int run(int argc, char** argv) {
     app.add_option("--max-samples-per-pixel", options.render.max_samples_per_pixel,
                    "Where the picture is noisy");
     app.add_option("--noise-target", options.render.noise_target, "See FinalOptions");
+    app.add_option("--soft-samples-per-pixel", options.render.soft_samples_per_pixel,
+                   "See FinalOptions");
     app.add_option("--pass-photon-count", options.render.pass_photon_count, "See FinalOptions");
     app.add_option("--gather-radius-m", options.render.caustics.gather_radius_m,
                    "0: half a pixel's width");

@@ -11,6 +11,8 @@ std::vector<RecordedRay> list;
 using Intersect = void (*)(RTCScene, RTCIntersectContext*, RTCRayHit*);
 using Occluded = void (*)(RTCScene, RTCIntersectContext*, RTCRay*);
 const auto embree_intersect = reinterpret_cast<Intersect>(dlsym(RTLD_NEXT, "rtcIntersect1"));
+using Stream = void (*)(RTCScene, RTCIntersectContext*, RTCRayHit*, unsigned, std::size_t);
+const auto embree_stream = reinterpret_cast<Stream>(dlsym(RTLD_NEXT, "rtcIntersect1M"));
 const auto embree_occluded = reinterpret_cast<Occluded>(dlsym(RTLD_NEXT, "rtcOccluded1"));
 
 }  // namespace
@@ -25,36 +27,77 @@ std::vector<RecordedRay> stop_recording() {
     return std::move(list);
 }
 
+namespace {
+
+RTCRayHit start_of(const RecordedRay& recorded) {
+    RTCRayHit hit;
+    hit.ray = recorded.ray;
+    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    return hit;
+}
+
+void count(const RTCRayHit& hit, ReplaySums& sums) {
+    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
+    ++sums.hits;
+    sums.distance += hit.ray.tfar;
+}
+
+void send_one(const RecordedRay& recorded, ReplaySums& sums) {
+    RTCIntersectContext context = recorded.context;
+    if (recorded.is_occlusion) {
+        RTCRay ray = recorded.ray;
+        embree_occluded(recorded.scene, &context, &ray);
+        sums.hits += ray.tfar < 0 ? 1 : 0;
+        return;
+    }
+    RTCRayHit hit = start_of(recorded);
+    embree_intersect(recorded.scene, &context, &hit);
+    count(hit, sums);
+}
+
+}  // namespace
+
 ReplaySums replay(const std::vector<RecordedRay>& rays) {
     ReplaySums sums;
-    RTCRayHit hit;
-    for (const RecordedRay& recorded : rays) {
-        RTCIntersectContext context = recorded.context;
-        if (recorded.is_occlusion) {
-            RTCRay ray = recorded.ray;
-            embree_occluded(recorded.scene, &context, &ray);
-            sums.hits += ray.tfar < 0 ? 1 : 0;
+    std::vector<RTCRayHit> stream;
+    for (std::size_t i = 0; i < rays.size(); i += rays[i].stream) {
+        if (rays[i].stream == 1) {
+            send_one(rays[i], sums);
             continue;
         }
-        hit.ray = recorded.ray;
-        hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-        embree_intersect(recorded.scene, &context, &hit);
-        if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
-        ++sums.hits;
-        sums.distance += hit.ray.tfar;
+        stream.resize(rays[i].stream);
+        for (std::size_t k = 0; k < stream.size(); ++k) stream[k] = start_of(rays[i + k]);
+        RTCIntersectContext context = rays[i].context;
+        embree_stream(rays[i].scene, &context, stream.data(), static_cast<unsigned>(stream.size()),
+                      sizeof(RTCRayHit));
+        for (const RTCRayHit& hit : stream) count(hit, sums);
     }
+    return sums;
+}
+
+ReplaySums replay_apart(const std::vector<RecordedRay>& rays) {
+    ReplaySums sums;
+    for (const RecordedRay& ray : rays) send_one(ray, sums);
     return sums;
 }
 
 }  // namespace vitrine
 
 extern "C" void rtcIntersect1(RTCScene scene, RTCIntersectContext* context, RTCRayHit* hit) {
-    if (vitrine::is_recording) vitrine::list.push_back({hit->ray, scene, *context, false});
+    if (vitrine::is_recording) vitrine::list.push_back({hit->ray, scene, *context, false, 1});
     vitrine::embree_intersect(scene, context, hit);
 }
 
 extern "C" void rtcOccluded1(RTCScene scene, RTCIntersectContext* context, RTCRay* ray) {
-    if (vitrine::is_recording) vitrine::list.push_back({*ray, scene, *context, true});
+    if (vitrine::is_recording) vitrine::list.push_back({*ray, scene, *context, true, 1});
     vitrine::embree_occluded(scene, context, ray);
+}
+
+extern "C" void rtcIntersect1M(RTCScene scene, RTCIntersectContext* context, RTCRayHit* hits,
+                               unsigned count, std::size_t stride) {
+    for (unsigned i = 0; vitrine::is_recording && i < count; ++i) {
+        vitrine::list.push_back({hits[i].ray, scene, *context, false, i == 0 ? count : 0});
+    }
+    vitrine::embree_stream(scene, context, hits, count, stride);
 }

@@ -3,7 +3,8 @@
 #include "base/parallel.h"
 #include "render/interface.h"
 #include "render/sampler.h"
-#include "render/small_stack.h"
+
+#include <span>
 
 namespace vitrine {
 namespace {
@@ -93,68 +94,116 @@ struct Flight {
     Vec3f origin, direction;
     Rgb power;
     Media media;
+    float initial = 0;       ///< power of the photon at first, of its strongest channel
+    std::uint32_t slot = 0;  ///< of the photon in its group
     int depth = 0;
     bool is_glossy = false;
     bool has_arrived = false;  ///< stored at a receiver before: later stores are no new power
 };
 
-class Tracer {
-    using Pending = SmallStack<Flight, 48>;
+/// Photons that fly side by side, and what became of them.
+struct Group {
+    std::vector<std::uint64_t> indices;
+    std::vector<std::uint8_t> is_touched;  ///< met a virtual part
+    std::vector<Photon> arrivals;
+    std::vector<std::uint32_t> slots;  ///< whose arrival each is
+};
 
+class Tracer {
   public:
     Tracer(const RenderScene& scene, const CausticOptions& options)
         : scene_(scene), options_(options) {}
 
-    /// Follows the photon `index` of `target` among the parts of `view`; appends its arrivals.
-    /// Returns true when the path met a virtual part.
-    bool trace(const Target& target, std::uint64_t index, std::uint32_t view,
-               std::vector<Photon>& arrivals, PhotonBalance& balance) const {
+    /// Follows the photons `group.indices` of `target` among the parts of `view`. All go on by one
+    /// surface at a time: neighbours take much the same way, and are traced together.
+    void trace(const Target& target, std::uint32_t view, Group& group,
+               PhotonBalance& balance) const {
+        group.is_touched.assign(group.indices.size(), 0);
+        group.arrivals.clear();
+        group.slots.clear();
+        std::vector<Flight> flights, next, faint;
+        std::vector<Ray> rays;
+        std::vector<Hit> hits;
+        for (std::uint32_t slot = 0; slot < group.indices.size(); ++slot) {
+            ++balance.shot;
+            Flight flight = emit(target, group.indices[slot]);
+            flight.slot = slot;
+            if (flight.initial > 0) flights.push_back(flight);
+        }
+        for (int generation = 0; !flights.empty(); ++generation) {
+            rays.clear();
+            for (const Flight& f : flights) {
+                rays.push_back({f.origin, f.direction, 0.0f, 1e30f, view});
+            }
+            hits.resize(rays.size());
+            closest(generation, rays, hits);
+            next.clear();
+            faint.clear();
+            for (std::size_t i = 0; i < flights.size(); ++i) {
+                Flight& flight = flights[i];
+                if (hits[i].is_hit() && scene_.is_virtual(hits[i].part)) {
+                    group.is_touched[flight.slot] = 1;
+                }
+                if (!goes_on(target, flight, hits[i], balance)) continue;
+                const PathSampler sampler(target.key,
+                                          static_cast<std::uint32_t>(group.indices[flight.slot]));
+                if (step(flight, hits[i], sampler, faint, group, view, balance)) {
+                    next.push_back(flight);
+                }
+            }
+            // The faint branches of neighbours are neighbours too.
+            next.insert(next.end(), faint.begin(), faint.end());
+            flights.swap(next);
+        }
+    }
+
+  private:
+    /// The first surfaces are met side by side; behind them neighbours have parted, and Embree's
+    /// packets of such rays cost more than the rays one by one.
+    void closest(int generation, const std::vector<Ray>& rays, std::vector<Hit>& hits) const {
+        constexpr int kTogether = 4;
+        if (generation < kTogether) {
+            scene_.closest(rays, hits);
+            return;
+        }
+        for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = scene_.closest(rays[i]);
+    }
+
+    Flight emit(const Target& target, std::uint64_t index) const {
         const PathSampler sampler(target.key, static_cast<std::uint32_t>(index));
         const Vec2f on_light = scene_.lights().needs_position(target.light)
                                    ? sampler.further_pair(0)
                                    : Vec2f(0.5f, 0.5f);
         const EmittedRay emitted = scene_.lights().emit(
             target.light, target.sphere, sampler.pair(0, 0), on_light, scene_.bounding_sphere());
-        ++balance.shot;
-        if (!(emitted.power > 0).any()) return false;
-        bool is_touched = false;
-        Pending pending;
-        Flight first;
-        first.origin = emitted.origin;
-        first.direction = emitted.direction;
-        first.power = emitted.power / static_cast<float>(target.count);
-        const float initial = first.power.maxCoeff();
-        pending.push(first);
-        while (!pending.empty()) {
-            Flight flight = pending.pop();
-            while (true) {
-                Ray ray{flight.origin, flight.direction, 0.0f, 1e30f, view};
-                const Hit hit = scene_.closest(ray);
-                if (!hit.is_hit()) {
-                    if (flight.depth > 0 && !flight.has_arrived) {
-                        balance.escaped += flight.power.sum();
-                    }
-                    break;
-                }
-                is_touched |= scene_.is_virtual(hit.part);
-                if (flight.depth == 0) {
-                    if (hit.part != target.part) break;
-                    ++balance.met;
-                    balance.emitted += flight.power.sum();
-                }
-                if (flight.depth > options_.max_interfaces) {
-                    if (!flight.has_arrived) balance.ended += flight.power.sum();
-                    break;
-                }
-                if (!step(flight, hit, sampler, initial, pending, arrivals, view, balance)) {
-                    break;
-                }
-            }
-        }
-        return is_touched;
+        Flight flight;
+        flight.origin = emitted.origin;
+        flight.direction = emitted.direction;
+        flight.power = emitted.power / static_cast<float>(target.count);
+        flight.initial = flight.power.maxCoeff();
+        return flight;
     }
 
-  private:
+    /// False when nothing that counts was met.
+    bool goes_on(const Target& target, const Flight& flight, const Hit& hit,
+                 PhotonBalance& balance) const {
+        const double power = flight.power.sum();
+        if (!hit.is_hit()) {
+            if (flight.depth > 0 && !flight.has_arrived) balance.escaped += power;
+            return false;
+        }
+        if (flight.depth == 0) {
+            if (hit.part != target.part) return false;
+            ++balance.met;
+            balance.emitted += power;
+        }
+        if (flight.depth > options_.max_interfaces) {
+            if (!flight.has_arrived) balance.ended += power;
+            return false;
+        }
+        return true;
+    }
+
     void absorb(Flight& flight, const Rgb& factor, PhotonBalance& balance) const {
         const double before = flight.power.sum();
         flight.power *= factor;
@@ -162,14 +211,14 @@ class Tracer {
     }
 
     /// One surface; false when the flight ends.
-    bool step(Flight& flight, const Hit& hit, const PathSampler& sampler, float initial,
-              Pending& pending, std::vector<Photon>& arrivals, std::uint32_t view,
+    bool step(Flight& flight, const Hit& hit, const PathSampler& sampler,
+              std::vector<Flight>& pending, Group& group, std::uint32_t view,
               PhotonBalance& balance) const {
         const ShadingPoint point = scene_.surface(hit, flight.direction);
         absorb(flight, scene_.transmittance(flight.media, hit.distance), balance);
         const int depth = flight.depth++;
         if (scene_.dielectric(hit.part)) {
-            return pass_interface(flight, point, depth, sampler, initial, pending, balance);
+            return pass_interface(flight, point, depth, sampler, pending, balance);
         }
         const Bsdf bsdf = scene_.bsdf(point, hit);
         if (is_smooth(bsdf)) {
@@ -189,16 +238,17 @@ class Tracer {
             photon.views = static_cast<std::uint8_t>(view);
             photon.is_glossy = flight.is_glossy;
             photon.keeps_direction = !std::holds_alternative<DiffuseBsdf>(bsdf);
-            arrivals.push_back(photon);
+            group.arrivals.push_back(photon);
+            group.slots.push_back(flight.slot);
             if (!flight.has_arrived) balance.stored += flight.power.sum();
             flight.has_arrived = true;
         }
         if (!has_lobe) return false;
-        return scatter(flight, point, bsdf, depth, sampler, initial, balance);
+        return scatter(flight, point, bsdf, depth, sampler, balance);
     }
 
     bool pass_interface(Flight& flight, const ShadingPoint& point, int depth,
-                        const PathSampler& sampler, float initial, Pending& pending,
+                        const PathSampler& sampler, std::vector<Flight>& pending,
                         PhotonBalance& balance) const {
         const InterfaceEvent event = cross_interface(scene_, point, flight.direction, flight.media);
         const auto reflect_flight = [&](Flight& f) {
@@ -222,18 +272,19 @@ class Tracer {
         const bool is_mostly_reflected = event.reflectance > 0.5f;
         const float strong = is_mostly_reflected ? event.reflectance : 1 - event.reflectance;
         Rgb faint_power = flight.power * (1 - strong);
-        const float chance = std::min(1.0f, kFaintBranchBoost * faint_power.maxCoeff() / initial);
-        const bool stays = sampler.number(depth, 2) < chance && !pending.is_full();
+        const float chance =
+            std::min(1.0f, kFaintBranchBoost * faint_power.maxCoeff() / flight.initial);
+        const bool stays = sampler.number(depth, 2) < chance;
         if (gamble(faint_power, flight.has_arrived, stays, chance, balance)) {
             Flight faint = flight;
             faint.power = faint_power;
             is_mostly_reflected ? refract_flight(faint) : reflect_flight(faint);
-            pending.push(faint);
+            pending.push_back(faint);
         }
         flight.power *= strong;
         is_mostly_reflected ? reflect_flight(flight) : refract_flight(flight);
         return survive(
-            flight, [&] { return sampler.pair(depth, 2).y(); }, initial, balance);
+            flight, [&] { return sampler.pair(depth, 2).y(); }, balance);
     }
 
     /// Russian roulette: the power of those that stay makes up for those that go.
@@ -247,14 +298,14 @@ class Tracer {
 
     /// @param draw gives the random number, if it is needed
     template <typename Draw>
-    static bool survive(Flight& flight, const Draw& draw, float initial, PhotonBalance& balance) {
-        const float survival = flight.power.maxCoeff() / (initial * kSurePower);
+    static bool survive(Flight& flight, const Draw& draw, PhotonBalance& balance) {
+        const float survival = flight.power.maxCoeff() / (flight.initial * kSurePower);
         return survival >= 1 ||
                gamble(flight.power, flight.has_arrived, draw() < survival, survival, balance);
     }
 
     bool scatter(Flight& flight, const ShadingPoint& point, const Bsdf& bsdf, int depth,
-                 const PathSampler& sampler, float initial, PhotonBalance& balance) const {
+                 const PathSampler& sampler, PhotonBalance& balance) const {
         const Frame frame(point.shading_normal);
         const Vec3f wo = frame.to_local(-flight.direction);
         BsdfSample s = sample(bsdf, wo, sampler.pair(depth, 3), 0x1.fffffep-1f);
@@ -267,7 +318,7 @@ class Tracer {
         flight.origin = scene_.leave(point, direction);
         flight.is_glossy = true;
         return survive(
-            flight, [&] { return sampler.number(depth, 4); }, initial, balance);
+            flight, [&] { return sampler.number(depth, 4); }, balance);
     }
 
     const RenderScene& scene_;
@@ -275,13 +326,12 @@ class Tracer {
 };
 
 /// The photons [first, first + count) of a target, those sent in nearly the same direction one
-/// after the other: rays that follow their neighbours find the hierarchy in the cache, which saves
-/// a third of their time.
+/// after the other: rays that run beside their neighbours share the work of finding what they meet.
 std::vector<std::uint64_t> coherent_order(const Target& target, std::uint64_t first,
                                           std::uint64_t count) {
-    constexpr unsigned kBits = 6;  // per axis: as many cells as half a block has photons
+    constexpr unsigned kBits = 9;  // per axis: as many cells as half a chunk has photons
     constexpr std::size_t kCells = std::size_t{1} << (2 * kBits);
-    std::vector<std::uint16_t> cell(count);
+    std::vector<std::uint32_t> cell(count);
     std::vector<std::uint32_t> start(kCells + 1, 0);
     for (std::uint64_t k = 0; k < count; ++k) {
         const Vec2f u = PathSampler(target.key, static_cast<std::uint32_t>(first + k)).pair(0, 0);
@@ -291,7 +341,7 @@ std::vector<std::uint64_t> coherent_order(const Target& target, std::uint64_t fi
         for (unsigned bit = 0; bit < kBits; ++bit) {
             code |= (x >> bit & 1u) << (2 * bit) | (y >> bit & 1u) << (2 * bit + 1);
         }
-        cell[k] = static_cast<std::uint16_t>(code);
+        cell[k] = code;
         ++start[code + 1];
     }
     for (std::size_t c = 0; c < kCells; ++c) start[c + 1] += start[c];
@@ -326,22 +376,28 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
     const Tracer tracer(scene, options);
     const bool has_virtual = scene.has_virtual();
     constexpr std::uint64_t kBlock = 8192;
+    constexpr std::size_t kGroup = 1024;  // fits the nearer caches
     constexpr std::uint64_t kChunk = 64 * kBlock;
     struct Block {
         std::vector<Photon> photons;
         PhotonBalance balance;
     };
-    const auto trace_both = [&](const Target& target, std::uint64_t index, Block& block) {
-        const std::size_t old_size = block.photons.size();
-        const bool is_touched =
-            tracer.trace(target, index, kAllParts, block.photons, block.balance);
-        if (!has_virtual || !is_touched) return;
-        for (std::size_t k = old_size; k < block.photons.size(); ++k) {
-            block.photons[k].views = kVirtualParts;
+    // In the scene with virtual parts, and where these are met in the one without.
+    const auto trace_both = [&](const Target& target, Group& group, Block& block) {
+        tracer.trace(target, kAllParts, group, block.balance);
+        for (std::size_t k = 0; has_virtual && k < group.arrivals.size(); ++k) {
+            if (group.is_touched[group.slots[k]]) group.arrivals[k].views = kVirtualParts;
         }
-        if (scene.is_virtual(target.part)) return;
+        block.photons.insert(block.photons.end(), group.arrivals.begin(), group.arrivals.end());
+        if (!has_virtual || scene.is_virtual(target.part)) return;
+        std::size_t touched = 0;
+        for (std::size_t slot = 0; slot < group.indices.size(); ++slot) {
+            if (group.is_touched[slot]) group.indices[touched++] = group.indices[slot];
+        }
+        group.indices.resize(touched);
         PhotonBalance ignored;
-        tracer.trace(target, index, kRealParts, block.photons, ignored);
+        tracer.trace(target, kRealParts, group, ignored);
+        block.photons.insert(block.photons.end(), group.arrivals.begin(), group.arrivals.end());
     };
     const std::vector<Target> targets = find_targets(scene, options);
     std::size_t done = 0;
@@ -352,12 +408,15 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
         for (std::uint64_t start = 0; start < target.count; start += kChunk) {
             const std::uint64_t count = std::min<std::uint64_t>(kChunk, target.count - start);
             std::vector<Block> blocks((count + kBlock - 1) / kBlock);
+            const std::vector<std::uint64_t> order = coherent_order(target, first + start, count);
             parallel_for_blocks(count, kBlock, [&](std::size_t begin, std::size_t end) {
                 Block& block = blocks[begin / kBlock];
                 block.photons.reserve(2 * kBlock);
-                for (const std::uint64_t index :
-                     coherent_order(target, first + start + begin, end - begin)) {
-                    trace_both(target, index, block);
+                Group group;
+                for (std::size_t k = begin; k < end; k += kGroup) {
+                    const auto part = std::span(order).subspan(k, std::min(kGroup, end - k));
+                    group.indices.assign(part.begin(), part.end());
+                    trace_both(target, group, block);
                 }
             });
             for (const Block& block : blocks) {

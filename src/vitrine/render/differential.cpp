@@ -25,19 +25,7 @@ RenderScene combine(Scene real, std::vector<Part> virtual_parts) {
 Image<SoftPixel> average_soft(const Image<PixelSums>& sums, SoftSums PixelSums::*of,
                               const Camera& camera) {
     Image<SoftPixel> pixels(sums.width(), sums.height(), SoftPixel{});
-    parallel_for(sums.size(), 4096, [&](std::size_t i) {
-        const PixelSums& s = sums[i];
-        const SoftSums& soft = s.*of;
-        if (soft.seen == 0) return;
-        SoftPixel& pixel = pixels[i];
-        pixel.position = soft.position / static_cast<float>(soft.seen);
-        pixel.normal = soft.normal.normalized();
-        if (soft.count == 0) return;
-        const auto n = static_cast<float>(soft.count);
-        pixel.value = {soft.with / n, soft.shadow / n, soft.diffuse / n, 1 / n, n};
-        pixel.inverse_distance_sum = soft.inverse_distance;
-        pixel.hits = soft.hits;
-    });
+    for (std::size_t i = 0; i < sums.size(); ++i) pixels[i] = (sums[i].*of).mean();
     average_soft_light(pixels, camera);
     return pixels;
 }

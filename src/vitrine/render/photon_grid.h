@@ -17,16 +17,16 @@ struct PackedDirection {
     Vec3f unpack() const;
 };
 
-/// 40 bytes.
+/// 36 bytes.
 struct Photon {
     Vec3f position = Vec3f::Zero();
     Rgb power = Rgb::Zero();                  ///< W
     PackedDirection to_light;                 ///< where it came from, away from the surface
     PackedDirection normal;                   ///< geometric, on the side it arrived
     std::array<std::uint8_t, 3> albedo = {};  ///< diffuse, of the receiver, in 1/255
-    std::uint8_t views = 3;        ///< scenes in which it arrives: kRealParts | kVirtualParts bits
-    bool is_glossy = false;        ///< bent by a glossy lobe somewhere: its pattern is soft
-    bool keeps_direction = false;  ///< the receiver is not Lambertian
+    std::uint8_t views : 2 = 3;  ///< scenes in which it arrives: kRealParts | kVirtualParts bits
+    bool is_glossy : 1 = false;  ///< bent by a glossy lobe somewhere: its pattern is soft
+    bool keeps_direction : 1 = false;  ///< the receiver is not Lambertian
 
     Rgb diffuse_albedo() const { return Rgb(albedo[0], albedo[1], albedo[2]) / 255.0f; }
     void set_diffuse_albedo(const Rgb& value) {
@@ -37,8 +37,10 @@ struct Photon {
     }
 };
 
+static_assert(sizeof(Photon) == 36);
+
 /// Photons sorted into cells of twice the gather radius. Building is linear in the count; memory is
-/// 40 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
+/// 36 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
 class PhotonGrid {
   public:
     PhotonGrid() = default;

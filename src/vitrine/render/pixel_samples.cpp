@@ -11,6 +11,34 @@ constexpr int kBlock = 2;
 
 }  // namespace
 
+void SoftSums::add(const PathResult& path, bool finds_soft) {
+    if (!path.soft.is_present) return;
+    ++seen;
+    albedo += path.soft.albedo;
+    position += path.soft.position;
+    normal += path.soft.normal;
+    if (!finds_soft) return;
+    ++count;
+    with += (path.soft.shadow + path.soft.diffuse) / path.soft.albedo.max(kLeastAlbedo);
+    if (path.soft.hit_distance > 0) {
+        ++hits;
+        inverse_distance += 1 / path.soft.hit_distance;
+    }
+}
+
+SoftPixel SoftSums::mean() const {
+    SoftPixel pixel;
+    if (seen == 0) return pixel;
+    pixel.position = position / static_cast<float>(seen);
+    pixel.normal = normal.normalized();
+    if (count == 0) return pixel;
+    const auto n = static_cast<float>(count);
+    pixel.value = {with / n, shadow / n, diffuse / n, 1 / n, n};
+    pixel.inverse_distance_sum = inverse_distance;
+    pixel.hits = hits;
+    return pixel;
+}
+
 float variance_of_mean(float sum, float square_sum, int count) {
     if (count < 2) return 0;
     const float mean = sum / static_cast<float>(count);
@@ -56,24 +84,16 @@ void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sum
     SoftSums& soft = is_covered ? sums.soft_virtual : sums.soft_real;
     const Rgb soft_with = with.soft.shadow + with.soft.diffuse;
     const Rgb soft_without = without.soft.shadow + without.soft.diffuse;
-    if (with.soft.is_present) {
-        ++soft.seen;
-        soft.albedo += with.soft.albedo;
-        soft.position += with.soft.position;
-        soft.normal += with.soft.normal;
-    }
-    if (wish.finds_soft && with.soft.is_present) {
-        const Rgb scale = 1.0f / with.soft.albedo.max(kLeastAlbedo);
-        ++soft.count;
-        soft.with += scale * soft_with;
+    soft.add(with, wish.finds_soft);
+    if (wish.finds_soft && with.soft.is_present && with.is_touched) {
         if (!is_covered) {
+            const Rgb scale = 1.0f / with.soft.albedo.max(kLeastAlbedo);
             soft.shadow += scale * (with.soft.shadow - without.soft.shadow);
             soft.diffuse += scale * (with.soft.diffuse - without.soft.diffuse);
         }
-        for (const PathResult* path : {&with, &without}) {
-            if (!(path->soft.hit_distance > 0)) continue;
+        if (without.soft.hit_distance > 0) {
             ++soft.hits;
-            soft.inverse_distance += 1 / path->soft.hit_distance;
+            soft.inverse_distance += 1 / without.soft.hit_distance;
         }
     }
     if (is_covered) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "render/path_tracer.h"
+#include "render/soft_light.h"
 
 namespace vitrine {
 
@@ -16,6 +17,11 @@ struct SoftSums {
     int hits = 0;
     int seen = 0;   // samples that show a plain diffuse surface
     int count = 0;  // and have found its soft light
+
+    /// @param finds_soft whether the path was asked for it
+    void add(const PathResult& path, bool finds_soft);
+    /// For `average_soft_light`; the variance is that per variance of one path.
+    SoftPixel mean() const;
 };
 
 /// Sums over the samples of one pixel.

@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "render/pixel_samples.h"
 #include "render/sample_plan.h"
 
 namespace vitrine {
@@ -55,7 +56,8 @@ constexpr int kMinPassSamples = 4;
 struct PixelSum {
     Rgbd sum = Rgbd::Zero();
     double square = 0;  // of the luminance
-    int count = 0;
+    int count = 0, soft_count = 0;
+    SoftSums soft;
 
     Rgbd mean() const { return sum / count; }
     /// Of the mean's luminance.
@@ -104,11 +106,18 @@ class ImageSampler {
           origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
 
-    /// Brings the pixel to `target` samples.
-    void add_samples(int x, int y, int target, PixelSum& sums) const {
+    /// Brings the pixel to `target` samples, and those with soft light to `soft_target` (negative:
+    /// all have it, as a part of the whole).
+    void add_samples(int x, int y, int target, int soft_target, PixelSum& sums) const {
         for (; sums.count < target; ++sums.count) {
             const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
-            const Rgb value = tracer_.trace(origin_, direction, sampler, kAllParts).total();
+            const PathWish wish{soft_target < 0 || sums.soft_count < soft_target, 1};
+            const PathResult path = tracer_.trace(origin_, direction, sampler, kAllParts, wish);
+            if (soft_target >= 0) {
+                sums.soft.add(path, wish.finds_soft);
+                sums.soft_count += wish.finds_soft ? 1 : 0;
+            }
+            const Rgb value = soft_target < 0 ? path.total() : path.sharp();
             sums.sum += value.cast<double>();
             sums.square += static_cast<double>(luminance(value)) * luminance(value);
         }
@@ -120,6 +129,23 @@ class ImageSampler {
     Vec3f origin_;
     std::uint64_t seed_;
 };
+
+/// Adds the soft light of each pixel's surface with that of its neighbours.
+void add_soft(const Image<PixelSum>& sums, const Camera& camera, ImageRgb& radiance) {
+    Image<SoftPixel> pixels(sums.width(), sums.height(), SoftPixel{});
+    for (std::size_t i = 0; i < sums.size(); ++i) pixels[i] = sums[i].soft.mean();
+    average_soft_light(pixels, camera);
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+        const auto n = static_cast<float>(sums[i].count);
+        radiance[i] += sums[i].soft.albedo / n * pixels[i].value.with;
+    }
+}
+
+/// Paths with soft light that a pixel gets of `per_pixel` on average: neighbours take turns.
+int soft_share(double per_pixel, int x, int y) {
+    constexpr double kTurn[2][2] = {{0.125, 0.625}, {0.875, 0.375}};
+    return static_cast<int>(per_pixel + kTurn[y & 1][x & 1]);
+}
 
 /// The mean over passes; `maps_of(pass, progress)` gives the photons of each (null: none).
 template <typename MapsOf>
@@ -136,6 +162,8 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         VITRINE_CHECK(plan.same_size(*options.samples));
         for (std::size_t i = 0; i < plan.size(); ++i) plan[i] = share_of((*options.samples)[i]);
     }
+    const bool is_averaged = options.soft_samples_per_pixel > 0;
+    const double soft_per_pass = options.soft_samples_per_pixel / pass_count;
     TranslucentLight translucent;
     for (int pass = 0; pass < pass_count; ++pass) {
         const double start = double(pass) / pass_count, share = 1.0 / pass_count;
@@ -149,7 +177,9 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         const auto run = [&](double from, double to) {
             for_each_pixel(camera, progress.part(start + from * share, start + to * share),
                            [&](int x, int y) {
-                               sampler.add_samples(x, y, plan(x, y) * (pass + 1), sums(x, y));
+                               const int soft =
+                                   is_averaged ? soft_share(soft_per_pass * (pass + 1), x, y) : -1;
+                               sampler.add_samples(x, y, plan(x, y) * (pass + 1), soft, sums(x, y));
                            });
         };
         const bool is_planned = pass > 0 || options.samples || options.max_samples_per_pixel <= 0;
@@ -164,6 +194,7 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         image.radiance[i] = sums[i].mean().cast<float>();
         image.variance[i] = static_cast<float>(sums[i].variance());
     }
+    if (is_averaged) add_soft(sums, camera, image.radiance);
     return image;
 }
 

@@ -13,6 +13,9 @@ struct FinalOptions {
     int samples_per_pixel = 64;     ///< everywhere
     int max_samples_per_pixel = 0;  ///< where the picture is noisy; 0: no more than everywhere
     double noise_target = 0.01;     ///< standard error wanted there, of the pixel's own level
+    /// Paths per pixel that look for soft light, which is then averaged over neighbours (see
+    /// soft_light.h); may be below one. 0: all paths do and nothing is averaged, as a reference.
+    double soft_samples_per_pixel = 0;
     /// Paths of each pixel, of the camera's size: takes the place of the three numbers above.
     const Image<int>* samples = nullptr;
     bool use_photons = true;          ///< false: the reference path tracer alone
@@ -25,7 +28,8 @@ struct FinalOptions {
 
 struct RenderedImage {
     ImageRgb radiance;  ///< linear, W/(m2 sr)
-    ImageF variance;    ///< of the luminance of each pixel's mean, from the spread of its samples
+    ImageF variance;    ///< of the luminance of each pixel's mean, from the spread of its samples;
+                        ///< without that of soft light which is averaged
 };
 
 /// What the camera sees straight ahead of each pixel's centre; no depth (0) where it meets nothing.

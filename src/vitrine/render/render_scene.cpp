@@ -4,7 +4,6 @@
 #include "base/parallel.h"
 
 #include <numeric>
-#include <span>
 
 namespace vitrine {
 namespace {
@@ -142,6 +141,25 @@ void RenderScene::measure_parts() {
     medium_rank_.resize(order.size());
     for (std::size_t i = 0; i < order.size(); ++i) {
         medium_rank_[static_cast<std::size_t>(order[i])] = static_cast<int>(i);
+    }
+}
+
+void RenderScene::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+    accel_.closest(rays, hits);
+    if (added_accel_.empty()) return;
+    std::vector<Ray> nearer(rays.begin(), rays.end());
+    std::vector<Hit> added(rays.size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!(rays[i].mask & kVirtualParts))
+            nearer[i].max_distance = -1.0f;
+        else if (hits[i].is_hit())
+            nearer[i].max_distance = hits[i].distance;
+    }
+    added_accel_.closest(nearer, added);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        if (!added[i].is_hit()) continue;
+        hits[i] = added[i];
+        hits[i].part += static_cast<int>(accel_.parts().size());
     }
 }
 

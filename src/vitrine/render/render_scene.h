@@ -7,6 +7,8 @@
 #include "scene/scene.h"
 #include "trace/accel.h"
 
+#include <span>
+
 namespace vitrine {
 
 /// Ray masks: which parts a ray can see.
@@ -70,6 +72,8 @@ class RenderScene {
         added.part += static_cast<int>(accel_.parts().size());
         return added;
     }
+    /// Of many rays; see `Accel::closest`.
+    void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
     bool is_occluded(const Ray& ray) const {
         if (accel_.is_occluded(ray)) return true;
         return !added_accel_.empty() && (ray.mask & kVirtualParts) && added_accel_.is_occluded(ray);

@@ -4,6 +4,7 @@
 
 #include <embree3/rtcore.h>
 
+#include <array>
 #include <limits>
 
 namespace vitrine {
@@ -117,16 +118,18 @@ Accel::Accel(std::vector<AccelPart> parts) : parts_(std::move(parts)) {
     impl_ = std::move(impl);
 }
 
-Hit Accel::closest(const Ray& ray) const {
-    Hit result;
-    if (!impl_) return result;
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
+namespace {
+
+RTCRayHit start_of(const Ray& ray) {
     RTCRayHit hit;
     hit.ray = to_embree(ray);
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(impl_->scene, &context, &hit);
+    return hit;
+}
+
+Hit end_of(const RTCRayHit& hit) {
+    Hit result;
     if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return result;
     result.distance = hit.ray.tfar;
     result.part = static_cast<int>(hit.hit.geomID);
@@ -134,6 +137,37 @@ Hit Accel::closest(const Ray& ray) const {
     result.barycentric = Vec2f(hit.hit.u, hit.hit.v);
     result.normal = Vec3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
     return result;
+}
+
+}  // namespace
+
+Hit Accel::closest(const Ray& ray) const {
+    if (!impl_) return {};
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    RTCRayHit hit = start_of(ray);
+    rtcIntersect1(impl_->scene, &context, &hit);
+    return end_of(hit);
+}
+
+void Accel::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
+    VITRINE_CHECK_EQ(rays.size(), hits.size());
+    if (!impl_) {
+        std::fill(hits.begin(), hits.end(), Hit());
+        return;
+    }
+    constexpr std::size_t kStream = 64;  // rays that Embree sorts into packets at once
+    std::array<RTCRayHit, kStream> stream;
+    for (std::size_t begin = 0; begin < rays.size(); begin += kStream) {
+        const std::size_t count = std::min(kStream, rays.size() - begin);
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+        for (std::size_t i = 0; i < count; ++i) stream[i] = start_of(rays[begin + i]);
+        rtcIntersect1M(impl_->scene, &context, stream.data(), static_cast<unsigned>(count),
+                       sizeof(RTCRayHit));
+        for (std::size_t i = 0; i < count; ++i) hits[begin + i] = end_of(stream[i]);
+    }
 }
 
 bool Accel::is_occluded(const Ray& ray) const {

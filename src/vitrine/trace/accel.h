@@ -44,6 +44,9 @@ class Accel {
     explicit Accel(std::vector<AccelPart> parts);
 
     Hit closest(const Ray& ray) const;
+    /// Answers `hits[i]` for each ray. Neighbours of the list that run alike are traced together,
+    /// in half the time or less; those that do not cost as much as alone.
+    void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
     bool is_occluded(const Ray& ray) const;
     /// Answers `occluded[i]` for each ray; coherent groups are traced together.
     void occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const;
