@@ -32,13 +32,13 @@ FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_
     fitted.is_distant = is_distant;
     const LightDeviation deviation = light_deviation(fit, set, k);
     const LampError& model = model_error_of(set, k);
-    const double log_distance = kDistanceShare * deviation.log_distance;
+    const double log_distance = std::hypot(deviation.log_distance, model.log_distance);
     fitted.stddev_direction_deg =
         degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, model.direction_rad));
-    fitted.stddev_distance_m = polar.distance_m * std::hypot(log_distance, model.log_distance);
+    fitted.stddev_distance_m = polar.distance_m * log_distance;
     fitted.stddev_radius_m =
         trial.radius_m * std::hypot(deviation.log_radius, deviation.log_distance, kModelLogRadius);
-    fitted.stddev_intensity_ratio = std::hypot(2.0 * log_distance, model.log_intensity);
+    fitted.stddev_intensity_ratio = std::hypot(2.0 * log_distance, model.log_irradiance);
     fitted.outcome = Outcome::Converged;
     if (!deviation.is_identifiable || fitted.stddev_direction_deg > kMaxDirectionDeviationDeg) {
         fitted.outcome = Outcome::NotIdentifiable;

@@ -30,12 +30,6 @@ Vec3 tilted(const Vec3& direction, double x, double y) {
         .normalized();
 }
 
-void sort_by_cost(std::vector<LightSet>& sets) {
-    std::stable_sort(sets.begin(), sets.end(), [](const LightSet& a, const LightSet& b) {
-        return a.score.cost < b.score.cost;
-    });
-}
-
 // Two angles, log distance, log radius of one light.
 constexpr int kCount = 4;
 using Vector = Eigen::Matrix<double, kCount, 1>;
@@ -64,6 +58,12 @@ Matrix inverse_of(const Matrix& hessian) {
 }
 
 }  // namespace
+
+void sort_by_cost(std::vector<LightSet>& sets) {
+    std::stable_sort(sets.begin(), sets.end(), [](const LightSet& a, const LightSet& b) {
+        return a.score.cost < b.score.cost;
+    });
+}
 
 HemisphereGrid make_hemisphere(const ScanSamples& samples, int count) {
     HemisphereGrid grid;
@@ -227,16 +227,16 @@ LightSet at_distance(const LightFit& fit, const LightSet& set, std::size_t k, do
                           .keep_distances = is_far});
 }
 
-double evidence_of_distance(const LightFit& fit, const LightSet& near, const LightSet& distant) {
+double evidence_over(const LightFit& fit, const LightSet& better, const LightSet& worse) {
     constexpr int kDiscSamples = 16;
-    std::vector<double> near_loss, distant_loss, weight;
-    fit.losses(columns_of(fit, near.lights, kDiscSamples, 1), 1, kLuminance, near.score, near_loss,
-               weight);
-    fit.losses(columns_of(fit, distant.lights, kDiscSamples, 1), 1, kLuminance, distant.score,
-               distant_loss, weight);
+    std::vector<double> better_loss, worse_loss, weight;
+    fit.losses(columns_of(fit, better.lights, kDiscSamples, 1), 1, kLuminance, better.score,
+               better_loss, weight);
+    fit.losses(columns_of(fit, worse.lights, kDiscSamples, 1), 1, kLuminance, worse.score,
+               worse_loss, weight);
     std::map<int, double> block_sum;
     for (std::size_t i = 0; i < weight.size(); ++i)
-        block_sum[fit.samples().block[i]] += weight[i] * (distant_loss[i] - near_loss[i]);
+        block_sum[fit.samples().block[i]] += weight[i] * (worse_loss[i] - better_loss[i]);
     double sum = 0.0, square = 0.0;
     for (const auto& [block, value] : block_sum) {
         sum += value;

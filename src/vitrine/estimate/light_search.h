@@ -34,6 +34,8 @@ TrialLight to_trial(const PolarLight& light, const Vec3& reference_point_m);
 LightColumns columns_of(const LightFit& fit, std::span<const PolarLight> lights, int disc_samples,
                         int stride);
 
+void sort_by_cost(std::vector<LightSet>& sets);  ///< best first
+
 /// Scores every grid light alone; best first.
 std::vector<LightSet> search_single(const LightFit& fit, const HemisphereGrid& grid, int stride);
 
@@ -46,9 +48,10 @@ bool has_distant(const LightFit& fit, const LightSet& set);
 /// The set refined with light `k` first put at a distance, in radii of the scene, with the same
 /// penumbrae; a distant light stays as far.
 LightSet at_distance(const LightFit& fit, const LightSet& set, std::size_t k, double per_radius);
-/// How clearly the nearer light `k` explains the scan better than the same light far away: the
-/// difference of the losses over its deviation, from sums over blocks. Below 2: not at all.
-double evidence_of_distance(const LightFit& fit, const LightSet& near, const LightSet& distant);
+/// How clearly one set explains the scan better than another: the difference of the losses over its
+/// deviation, from sums over blocks. Below 2: not at all. Where few blocks tell them apart (a
+/// shadow or two) it stays small: at most the root of their number.
+double evidence_over(const LightFit& fit, const LightSet& better, const LightSet& worse);
 
 struct RefineOptions {
     int stride = 1;

@@ -1,12 +1,11 @@
 #include "estimate/lights.h"
 
-#include "base/log.h"
+#include "estimate/find_lights.h"
 #include "estimate/known_lights.h"
 #include "estimate/light_data.h"
 #include "estimate/light_outcome.h"
 #include "estimate/light_search.h"
 #include "math/optimise.h"
-#include "math/statistics.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,118 +14,8 @@ namespace vitrine {
 
 namespace {
 
-constexpr int kScoutStride = 3;        // one third of the samples finds the basin
-constexpr int kDensePerCandidate = 4;  // shadows of small things lock within half a step of it
-constexpr double kMinStartSeparationRad = 0.35;  // one and a half steps of the dense grid
-constexpr std::size_t kStarts = 5;               // grid lights that are refined
-// A second light must explain this share of what one leaves (by evidence, see docs/estimation.md).
-constexpr double kSecondLightGain = 0.18;
-constexpr double kMinSecondShare = 0.08;  // of the irradiance: weaker ones are texture
-constexpr int kRestarts = 3;
-constexpr double kSettled = 0.995;            // a restart that gains less is the last
 constexpr double kNearPerRadius = 3.0;        // radii of the scene: a lamp over a table
 constexpr double kMinDistanceEvidence = 2.0;  // deviations; less, and it may be the sun
-constexpr double kMinSeparationRad = 0.436;
-
-/// A distant light stays distant while it is refined.
-RefineOptions with_distances_of(const LightFit& fit, const LightSet& set, RefineOptions options) {
-    options.keep_distances = has_distant(fit, set);
-    return options;
-}
-
-/// The best grid lights, no two of one basin.
-std::vector<LightSet> starts_of(const std::vector<LightSet>& singles) {
-    std::vector<LightSet> starts;
-    for (const LightSet& single : singles) {
-        const bool is_apart = std::all_of(starts.begin(), starts.end(), [&](const LightSet& start) {
-            return angle_between(start.lights[0].direction, single.lights[0].direction) >
-                   kMinStartSeparationRad;
-        });
-        if (is_apart) starts.push_back(single);
-        if (starts.size() == kStarts) break;
-    }
-    return starts;
-}
-
-LightSet find_lights(const LightFit& fit, const LightOptions& options, LightEstimate& estimate,
-                     const Progress& progress) {
-    const HemisphereGrid grid = make_hemisphere(fit.samples(), options.candidate_count);
-    const std::vector<LightSet> singles = search_single(fit, grid, kScoutStride);
-    estimate.error_initial = singles.front().score.cost;
-    estimate.grid_direction = singles.front().lights[0].direction;
-    progress.update(0.3, "refining the light");
-
-    const RefineOptions scout{.stride = kScoutStride,
-                              .disc_samples = 8,
-                              .max_evaluations = 70,
-                              .step_rad = 0.12,
-                              .refine_radius = false};
-    std::vector<LightSet> refined;
-    const HemisphereGrid dense =
-        make_hemisphere(fit.samples(), kDensePerCandidate * options.candidate_count);
-    for (const LightSet& start : starts_of(search_single(fit, dense, kScoutStride))) {
-        refined.push_back(refine_lights(fit, start, with_distances_of(fit, start, scout)));
-        const Vec3& d = refined.back().lights[0].direction;
-        log_debug("lights: start cost {:.4f} -> {:.4f} toward ({:.2f}, {:.2f}, {:.2f})",
-                  start.score.cost, refined.back().score.cost, d.x(), d.y(), d.z());
-    }
-    std::stable_sort(refined.begin(), refined.end(), [](const LightSet& a, const LightSet& b) {
-        return a.score.cost < b.score.cost;
-    });
-    const RefineOptions fine{
-        .stride = 1, .disc_samples = 16, .max_evaluations = 140, .step_rad = 0.04};
-    LightSet best =
-        refine_lights(fit, refined.front(), with_distances_of(fit, refined.front(), fine));
-    progress.update(0.6, "looking for a second light");
-
-    for (int count = 2; count <= options.max_lights; ++count) {
-        std::vector<LightSet> firsts = {best};
-        firsts.insert(
-            firsts.end(), singles.begin(),
-            singles.begin() + static_cast<long>(std::min<std::size_t>(6, singles.size())));
-        std::vector<LightSet> pairs = search_pairs(fit, grid, firsts, kScoutStride);
-        RefineOptions pair_scout = scout;
-        pair_scout.max_evaluations = 150;
-        LightSet best_pair;
-        best_pair.score.cost = 2.0;
-        for (std::size_t i = 0; i < std::min<std::size_t>(3, pairs.size()); ++i) {
-            LightSet pair =
-                refine_lights(fit, pairs[i], with_distances_of(fit, pairs[i], pair_scout));
-            if (pair.score.cost < best_pair.score.cost) best_pair = pair;
-        }
-        if (best_pair.lights.empty()) break;
-        const LightScore one =
-            fit.score(columns_of(fit, best.lights, 8, kScoutStride), kScoutStride, kLuminance);
-        log_debug("lights: {} cost {:.4f}, {} cost {:.4f}", count - 1, one.cost, count,
-                  best_pair.score.cost);
-        if (best_pair.score.cost > (1.0 - kSecondLightGain) * one.cost) break;
-        RefineOptions pair_fine = fine;
-        pair_fine.max_evaluations = 260;
-        pair_fine = with_distances_of(fit, best_pair, pair_fine);
-        best_pair = refine_lights(fit, best_pair, pair_fine);
-        // Ten unknowns: one simplex stalls, a fresh one goes on.
-        for (int again = 0; again < kRestarts; ++again) {
-            const LightSet next = refine_lights(fit, best_pair, pair_fine);
-            const bool has_settled = next.score.cost > kSettled * best_pair.score.cost;
-            if (next.score.cost < best_pair.score.cost) best_pair = next;
-            if (has_settled) break;
-        }
-        double total = 0.0, least = 1e30;
-        for (const PolarLight& light : best_pair.lights) {
-            const double e = light.weight / (light.distance_m * light.distance_m);
-            total += e;
-            least = std::min(least, e);
-        }
-        const PolarLight& last = best_pair.lights.back();
-        bool is_apart = true;
-        for (std::size_t i = 0; i + 1 < best_pair.lights.size(); ++i)
-            is_apart &=
-                angle_between(best_pair.lights[i].direction, last.direction) > kMinSeparationRad;
-        if (least < kMinSecondShare * total || !is_apart) break;
-        best = best_pair;
-    }
-    return best;
-}
 
 /// Strength per channel: ambient ratio, scale and, with several lights, their shares.
 void fit_channels(const LightFit& fit, const LightSet& set, LightEstimate& estimate) {
@@ -169,7 +58,7 @@ bool keep_nearer_if_evident(const LightFit& fit, LightSet& set, std::size_t k) {
         at_distance(fit, set, k, starts_far ? kNearPerRadius : kDistantPerRadius);
     const LightSet& near = starts_far ? other : set;
     const LightSet& far = starts_far ? set : other;
-    const bool is_near = evidence_of_distance(fit, near, far) >= kMinDistanceEvidence;
+    const bool is_near = evidence_over(fit, near, far) >= kMinDistanceEvidence;
     if (is_near == starts_far) set = other;
     return is_near;
 }
@@ -214,7 +103,11 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
                                                .keep_distances = has_distant(fit, start)};
         set = refine_lights(fit, start, refine);
     } else {
-        set = find_lights(fit, options, estimate, progress);
+        const FoundLights found = find_lights(fit, options, progress.part(0.15, 0.75));
+        set = found.set;
+        estimate.error_initial = found.grid_cost;
+        estimate.grid_direction = found.grid_direction;
+        estimate.rival = found.rival;
     }
     progress.update(0.75, "near or distant");
     std::vector<char> is_distant(set.lights.size(), 0);
@@ -242,8 +135,22 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
             fitted.reason = estimate.reason;
         }
     }
+    if (const std::string rival = estimate.rival; !rival.empty()) doubt_by_rival(estimate, rival);
     progress.update(1.0);
     return estimate;
+}
+
+void doubt_by_rival(LightEstimate& estimate, const std::string& rival) {
+    estimate.rival = rival;
+    if (rival.empty()) return;
+    for (FittedLight& fitted : estimate.lights) {
+        if (fitted.outcome != Outcome::Converged) continue;
+        fitted.outcome = Outcome::Ambiguous;
+        fitted.reason = rival;
+    }
+    if (estimate.outcome != Outcome::Converged) return;
+    estimate.outcome = Outcome::Ambiguous;
+    estimate.reason = rival;
 }
 
 double elevation_deg(const LightEstimate& estimate, const Vec3& light_position_m) {

@@ -49,9 +49,13 @@ struct LightEstimate {
     double error_refined = 0.0;
     double residual_rms = 0.0;            ///< relative, of the inliers
     Vec3 grid_direction = Vec3(0, 0, 1);  ///< best of the grid lights, for comparison
+    std::string rival;  ///< other lights that explain the scan about as well; empty: none
     Outcome outcome = Outcome::NotIdentifiable;
     std::string reason;
 };
+
+/// Lights that converged are ambiguous all the same when others explain the scan as well.
+void doubt_by_rival(LightEstimate& estimate, const std::string& rival);
 
 /// Fits lights and ambient to the scan: hemisphere of candidates, albedos projected out, then
 /// continuous refinement of direction, distance and disc radius; a second light by evidence.

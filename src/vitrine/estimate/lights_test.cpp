@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "base/rng.h"
 #include "estimate/light_search.h"
 #include "geometry/primitives.h"
 
@@ -19,7 +20,8 @@ struct World {
     std::vector<RgbdFrame> frames;
 };
 
-World make_world(const std::vector<DiscLight>& lights, float ambient, float clip = 1e9f) {
+World make_world(const std::vector<DiscLight>& lights, float ambient, float clip = 1e9f,
+                 float texture = 0.0f) {
     World world;
     Mesh scan = make_plane(1.2, 0.0, 120);
     std::vector<Rgb> albedo(scan.vertices.size(), Rgb(0.4f, 0.35f, 0.3f));
@@ -67,7 +69,13 @@ World make_world(const std::vector<DiscLight>& lights, float ambient, float clip
                 if (!hit.is_hit()) continue;
                 const Triangle& t = scan.triangles[static_cast<std::size_t>(hit.triangle)];
                 points.push_back({hit_point(scan, hit), hit.normal});
-                colours.push_back(albedo[static_cast<std::size_t>(t[0])]);
+                const Vec3f& p = points.back().position;  // squares of paint, 3 cm wide
+                const auto square =
+                    static_cast<std::uint64_t>(std::floor(p.x() / 0.03f) + 100) +
+                    1000 * static_cast<std::uint64_t>(std::floor(p.y() / 0.03f) + 100);
+                const float paint = static_cast<float>(mix_bits(square) >> 40) * 0x1p-24f - 0.5f;
+                colours.push_back((1.0f + texture * paint) *
+                                  albedo[static_cast<std::size_t>(t[0])]);
                 pixels.emplace_back(u, v);
             }
         std::vector<Rgb> irradiance(points.size(), Rgb::Zero());
@@ -121,6 +129,41 @@ TEST(EstimateLights, TellsTwoLampsFromOne) {
     const bool is_a_first = error_deg(e.lights[0], a) < error_deg(e.lights[0], b);
     EXPECT_LT(error_deg(e.lights[is_a_first ? 0 : 1], a), 2.0);
     EXPECT_LT(error_deg(e.lights[is_a_first ? 1 : 0], b), 2.0);
+}
+
+TEST(EstimateLights, TwoLampsCloseTogetherAreNotSaidToBeOne) {
+    const Vec3 a(0.45, -0.35, 0.6);
+    const Vec3 b = Eigen::AngleAxisd(radians(20.0), Vec3::UnitZ()) * a;
+    const World world = make_world({aimed(a, 0.01, 3.0f), aimed(b, 0.01, 2.4f)}, 0.0f);
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, small_options());
+    EXPECT_TRUE(e.lights.size() == 2 || e.outcome == Outcome::Ambiguous);
+    EXPECT_EQ(e.outcome == Outcome::Ambiguous, !e.reason.empty());
+}
+
+TEST(EstimateLights, AWeakSecondLampIsFoundOnATextureTwiceItsShadow) {
+    // A fifth of the light: its shadows are fainter than the paint of the table.
+    const Vec3 a(0.45, -0.35, 0.6), b(-0.6, -0.2, 0.7);
+    const World world = make_world({aimed(a, 0.03, 3.0f), aimed(b, 0.03, 1.0f)}, 0.02f, 1e9f, 0.5f);
+    LightOptions options = small_options();
+    options.samples.count = 1600;
+    const LightEstimate e = estimate_lights(world.scene, world.frames, 1e9, options);
+    ASSERT_EQ(e.lights.size(), 2u);
+    const bool is_a_first = error_deg(e.lights[0], a) < error_deg(e.lights[0], b);
+    EXPECT_LT(error_deg(e.lights[is_a_first ? 0 : 1], a), 3.0);
+    EXPECT_LT(error_deg(e.lights[is_a_first ? 1 : 0], b), 6.0);
+}
+
+TEST(EstimateLights, ARivalMakesThemAmbiguousAndIsKept) {
+    LightEstimate e;
+    e.outcome = Outcome::Converged;
+    e.lights.resize(2);
+    e.lights[0].outcome = Outcome::Converged;
+    e.lights[1].outcome = Outcome::AtBound;
+    doubt_by_rival(e, "another");
+    EXPECT_EQ(e.outcome, Outcome::Ambiguous);
+    EXPECT_EQ(e.lights[0].outcome, Outcome::Ambiguous);
+    EXPECT_EQ(e.lights[1].outcome, Outcome::AtBound);
+    EXPECT_EQ(e.rival, "another");
 }
 
 TEST(EstimateLights, KnownLightsAreTakenAsTheyAre) {

@@ -24,10 +24,12 @@ void add_model_error(TransparentFit& solid, const TransparentOptions& options) {
                        kModelAbsorptionRatio);
 }
 
-void add_model_error(WardFit& fit) {
+void add_model_error(WardFit& fit, double light_stddev) {
     fit.sigma.stddev = std::hypot(fit.sigma.stddev, kModelLogSigma * fit.sigma.value);
     fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, kModelRhoD, kModelLogRhoD);
-    fit.stddev_rho_s = with_share(fit.stddev_rho_s, fit.ward.rho_s, 0.0, kModelLogRhoS);
+    fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, 0.0, light_stddev);
+    fit.stddev_rho_s =
+        with_share(fit.stddev_rho_s, fit.ward.rho_s, 0.0, std::hypot(kModelLogRhoS, light_stddev));
 }
 
 }  // namespace vitrine

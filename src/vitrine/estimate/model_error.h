@@ -12,16 +12,15 @@ namespace vitrine {
 /// Of one lamp.
 struct LampError {
     double direction_rad;  ///< per axis
-    double log_distance, log_intensity;
+    double log_distance;
+    double log_irradiance;  ///< the intensity's beside what follows from the distance
 };
-constexpr LampError kSingleLamp = {0.009, 0.012, 0.045};
+constexpr LampError kSingleLamp = {0.009, 0.02, 0.045};
 // Of several lamps each may stand nearer and weaker while another makes up for it; the weaker one
 // shows in little but its own shadows.
-constexpr LampError kStrongestLamp = {0.009, 0.035, 0.075};
-constexpr LampError kWeakerLamp = {0.022, 0.085, 0.22};
-constexpr double kModelLogRadius = 0.25;
-// Block sums take texture to be worse for the distance than it is: it has no 1 / r^2.
-constexpr double kDistanceShare = 0.5;
+constexpr LampError kStrongestLamp = {0.009, 0.035, 0.045};
+constexpr LampError kWeakerLamp = {0.022, 0.085, 0.14};
+constexpr double kModelLogRadius = 0.22;
 
 // Index: grows with the residual, which is large where the hull is off.
 constexpr double kModelIorPerCost = 0.25;
@@ -32,9 +31,11 @@ constexpr double kModelAbsorptionRatio = 0.05;
 constexpr double kModelLogSigma = 0.04;
 constexpr double kModelRhoD = 0.0015;  // absolute: next to a lobe little is left for diffuse light
 constexpr double kModelLogRhoD = 0.02;
-constexpr double kModelLogRhoS = 0.08;
+constexpr double kModelLogRhoS = 0.065;
 
 void add_model_error(TransparentFit& solid, const TransparentOptions& options);
-void add_model_error(WardFit& fit);
+/// @param light_stddev of the irradiance, relative: what is measured is its product with a
+///   reflectance
+void add_model_error(WardFit& fit, double light_stddev);
 
 }  // namespace vitrine

@@ -1,6 +1,28 @@
 #include "estimate/object_context.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace vitrine {
+
+namespace {
+
+/// Intensity and distance are in doubt together: what reaches the scene is known better.
+double stddev_of_irradiance(const LightEstimate& lights) {
+    double sum = 0.0, square = 0.0;
+    for (const FittedLight& fitted : lights.lights) {
+        const double distance = (fitted.light.position_m - lights.reference_point_m).norm();
+        const double irradiance =
+            luminance(fitted.light.intensity_w_per_sr) / (distance * distance);
+        const double shared = 2.0 * fitted.stddev_distance_m / distance;
+        const double ratio2 = fitted.stddev_intensity_ratio * fitted.stddev_intensity_ratio;
+        sum += irradiance;
+        square += irradiance * irradiance * std::max(0.0, ratio2 - shared * shared);
+    }
+    return sum > 0.0 ? std::sqrt(square) / sum : 0.0;
+}
+
+}  // namespace
 
 ObjectContext::ObjectContext(const Scene& scene, std::span<const RgbdFrame> frames,
                              double saturation_level, const LightEstimate& lights)
@@ -8,6 +30,7 @@ ObjectContext::ObjectContext(const Scene& scene, std::span<const RgbdFrame> fram
       lookup(world, scene.cameras, frames, saturation_level),
       bright(bright_level(lookup)) {
     light.ambient = lights.ambient_radiance;
+    light.stddev_irradiance_ratio = stddev_of_irradiance(lights);
     for (const FittedLight& fitted : lights.lights) light.lights.push_back(fitted.light);
 }
 

@@ -42,6 +42,17 @@ Rgb median_rgb(const std::vector<Rgb>& values) {
     return result;
 }
 
+/// Variance per axis of what a pixel's value averages on the surface: the square of the pixel and
+/// the linear interpolation between four of them, 1/12 + 1/6 square pixels, drawn out by slant.
+float footprint_squared(const Camera& camera, const Vec3f& centre, const SurfacePoint& point) {
+    constexpr float kSquarePixels = 0.25f;
+    const Vec3f offset = centre - point.position;
+    const float distance = offset.norm();
+    const float cos = std::max(point.normal.dot(offset) / distance, kMinViewCos);
+    const float pixel_m = distance / static_cast<float>(camera.fx);
+    return kSquarePixels * pixel_m * pixel_m * 0.5f * (1.0f + 1.0f / (cos * cos));
+}
+
 }  // namespace
 
 FrameLookup::FrameLookup(const EstimationScene& scene, const std::vector<Camera>& cameras,
@@ -67,6 +78,7 @@ std::optional<Rgb> FrameLookup::sample(const SurfacePoint& point, std::size_t f)
 FrameLookup::Seen FrameLookup::observe(const SurfacePoint& point) const {
     Seen seen;
     std::vector<Rgb> values;
+    float footprint2 = 0.0f;
     for (std::size_t f = 0; f < frames_.size(); ++f) {
         const std::optional<Rgb> value = sample(point, f);
         if (!value) continue;
@@ -74,10 +86,13 @@ FrameLookup::Seen FrameLookup::observe(const SurfacePoint& point) const {
             ++seen.saturated;
         } else {
             values.push_back(*value);
+            footprint2 += footprint_squared(cameras_[f], centres_[f], point);
         }
     }
     seen.views = static_cast<int>(values.size());
-    if (!values.empty()) seen.radiance = median_rgb(values);
+    if (values.empty()) return seen;
+    seen.radiance = median_rgb(values);
+    seen.footprint_m = std::sqrt(footprint2 / static_cast<float>(values.size()));
     return seen;
 }
 
@@ -109,6 +124,30 @@ struct Picked {
     bool is_good = false, is_saturated = false;
 };
 
+/// A pixel of a frame: sample `i` of a sequence that covers all pictures evenly.
+struct Place {
+    std::size_t frame;
+    double u, v;
+};
+Place place_of(const FrameLookup& lookup, std::size_t i, const Vec2f& shift) {
+    const std::size_t frame_count = lookup.frames().size();
+    const Vec2f uv = r2_point(i / frame_count, shift);
+    const Camera& camera = lookup.cameras()[i % frame_count];
+    return {i % frame_count, std::floor(uv.x() * static_cast<float>(camera.width)),
+            std::floor(uv.y() * static_cast<float>(camera.height))};
+}
+
+/// Where the scan is met first; nothing on a candidate, from behind, or past everything.
+std::optional<Hit> scan_hit(const EstimationScene& scene, const Camera& camera, double u,
+                            double v) {
+    const Vec3f direction = camera.ray_in_world(u, v).cast<float>();
+    const Hit hit = scene.accel().closest(
+        {camera.centre_in_world().cast<float>(), direction, 0.0f, 1e30f, kAllMask});
+    if (!hit.is_hit() || scene.object_of_part(hit.part) >= 0) return std::nullopt;
+    if (hit.normal.dot(direction) >= 0.0f) return std::nullopt;
+    return hit;
+}
+
 /// True when the four neighbours at `step` pixels meet about the same surface.
 bool is_smooth_around(const EstimationScene& scene, const Camera& camera, double u, double v,
                       const Hit& hit, double depth) {
@@ -124,17 +163,13 @@ bool is_smooth_around(const EstimationScene& scene, const Camera& camera, double
     return true;
 }
 
-Picked pick(const EstimationScene& scene, const FrameLookup& lookup, std::size_t frame,
-            const Vec2f& uv) {
+Picked pick(const EstimationScene& scene, const FrameLookup& lookup, const Place& place) {
     Picked picked;
+    const auto [frame, u, v] = place;
     const Camera& camera = lookup.cameras()[frame];
-    const double u = std::floor(uv.x() * static_cast<float>(camera.width));
-    const double v = std::floor(uv.y() * static_cast<float>(camera.height));
-    const Vec3f origin = camera.centre_in_world().cast<float>();
-    const Vec3f direction = camera.ray_in_world(u, v).cast<float>();
-    const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, kAllMask});
-    if (!hit.is_hit() || scene.object_of_part(hit.part) >= 0) return picked;
-    if (hit.normal.dot(direction) >= 0.0f) return picked;
+    const std::optional<Hit> found = scan_hit(scene, camera, u, v);
+    if (!found) return picked;
+    const Hit& hit = *found;
     if (!is_smooth_around(scene, camera, u, v, hit, hit.distance)) return picked;
     const Mesh& mesh = scene.mesh(hit.part);
     picked.point = {hit_point(mesh, hit), shading_normal(mesh, hit)};
@@ -145,6 +180,7 @@ Picked pick(const EstimationScene& scene, const FrameLookup& lookup, std::size_t
     }
     if (seen.views < 1) return picked;
     picked.radiance = seen.radiance;
+    picked.point.footprint_m = seen.footprint_m;
     const Rgb here = bilinear(lookup.frames()[frame].colour, u, v);
     const float scale = luminance(seen.radiance) + 0.01f * luminance(here);
     picked.is_good = scale > 0.0f &&
@@ -268,31 +304,97 @@ void find_extent(ScanSamples& samples) {
 
 }  // namespace
 
-ScanSamples sample_scan(const EstimationScene& scene, const FrameLookup& lookup,
-                        std::uint32_t see_through_mask, std::span<const Rgb> object_radiance,
-                        const SampleOptions& options) {
-    ScanSamples samples;
-    const std::size_t frame_count = lookup.frames().size();
-    std::vector<Picked> picked(at(options.count));
-    const Rng start(stream_key(options.seed, 0x5a3bu));
-    Rng rng = start;
-    const Vec2f shift(rng.next_float(), rng.next_float());
-    parallel_for(picked.size(), 32, [&](std::size_t i) {
-        picked[i] = pick(scene, lookup, i % frame_count, r2_point(i / frame_count, shift));
+namespace {
+
+/// What stands on the support plane and may throw a shadow: points of it and their heights.
+std::vector<std::pair<Vec3f, float>> standing_points(const EstimationScene& scene,
+                                                     const ScanSamples& samples) {
+    constexpr std::size_t kPerCandidate = 100;
+    const Vec3f normal = samples.plane.normal.cast<float>();
+    const auto offset = static_cast<float>(samples.plane.offset);
+    std::vector<std::pair<Vec3f, float>> standing;
+    const auto add = [&](const Vec3f& p) {
+        const float height = normal.dot(p) - offset;
+        if (height > static_cast<float>(kPlaneTolerance))
+            standing.emplace_back(p - height * normal, height);
+    };
+    for (const SurfacePoint& p : samples.points) add(p.position);
+    for (int k = 0; k < scene.object_count(); ++k) {
+        const std::vector<Vec3f>& vertices = scene.mesh(scene.part_of_object(k)).vertices;
+        const std::size_t step = std::max<std::size_t>(1, vertices.size() / kPerCandidate);
+        for (std::size_t i = 0; i < vertices.size(); i += step) add(vertices[i]);
+    }
+    return standing;
+}
+
+/// The first `count` places past the first pass that show something standing, or the plane within
+/// the reach of its shadow. An empty table shows little but its texture, however often it is asked.
+std::vector<Place> places_near_shadows(const EstimationScene& scene, const FrameLookup& lookup,
+                                       const ScanSamples& samples, std::size_t count,
+                                       const Vec2f& shift) {
+    constexpr float kReach = 1.5f;             // of the height: lights down to 34 degrees
+    constexpr std::size_t kTriesPerPlace = 8;  // where little stands there are fewer places
+    const std::vector<std::pair<Vec3f, float>> standing = standing_points(scene, samples);
+    const Vec3f normal = samples.plane.normal.cast<float>();
+    const auto offset = static_cast<float>(samples.plane.offset);
+    std::vector<char> is_near(kTriesPerPlace * count, 0);
+    parallel_for(is_near.size(), 256, [&](std::size_t i) {
+        const Place place = place_of(lookup, count + i, shift);
+        const auto hit = scan_hit(scene, lookup.cameras()[place.frame], place.u, place.v);
+        if (!hit) return;
+        const Vec3f p = hit_point(scene.mesh(hit->part), *hit);
+        const float height = normal.dot(p) - offset;
+        is_near[i] = std::abs(height) > static_cast<float>(kPlaneTolerance) ||
+                     std::any_of(standing.begin(), standing.end(), [&](const auto& s) {
+                         const float reach = kReach * s.second;
+                         return (p - height * normal - s.first).squaredNorm() < reach * reach;
+                     });
     });
-    samples.tried_count = options.count;
+    std::vector<Place> places;
+    for (std::size_t i = 0; i < is_near.size() && places.size() < count; ++i)
+        if (is_near[i]) places.push_back(place_of(lookup, count + i, shift));
+    return places;
+}
+
+void add_samples(const EstimationScene& scene, const FrameLookup& lookup,
+                 const std::vector<Place>& places, ScanSamples& samples) {
+    std::vector<Picked> picked(places.size());
+    parallel_for(picked.size(), 32,
+                 [&](std::size_t i) { picked[i] = pick(scene, lookup, places[i]); });
+    samples.tried_count += static_cast<int>(places.size());
     for (const Picked& p : picked) {
         samples.saturated_count += p.is_saturated;
         if (!p.is_good) continue;
         samples.points.push_back(p.point);
         samples.radiance.push_back(p.radiance);
     }
+}
+
+}  // namespace
+
+ScanSamples sample_scan(const EstimationScene& scene, const FrameLookup& lookup,
+                        std::uint32_t see_through_mask, std::span<const Rgb> object_radiance,
+                        const SampleOptions& options) {
+    ScanSamples samples;
+    const Rng start(stream_key(options.seed, 0x5a3bu));
+    Rng rng = start;
+    const Vec2f shift(rng.next_float(), rng.next_float());
+    const std::size_t half = at(options.count) / 2;
+    std::vector<Place> places(half);
+    for (std::size_t i = 0; i < half; ++i) places[i] = place_of(lookup, i, shift);
+    add_samples(scene, lookup, places, samples);
     if (samples.points.empty()) return samples;
     samples.plane = find_plane(samples.points, lookup.cameras());
+    find_extent(samples);  // of what is seen evenly
+    add_samples(scene, lookup, places_near_shadows(scene, lookup, samples, half, shift), samples);
     find_clusters(samples);
     for (std::size_t i = 0; i < samples.points.size(); ++i) {
         // A fused table is rough; its plane is not.
-        if (samples.cluster[i] == 0) samples.points[i].normal = samples.plane.normal.cast<float>();
+        if (samples.cluster[i] == 0) {
+            samples.points[i].normal = samples.plane.normal.cast<float>();
+        } else {
+            samples.points[i].footprint_m = 0.0f;  // it would reach past the edges of small things
+        }
         const Vec3 cell = samples.points[i].position.cast<double>() / options.block_size_m;
         samples.block.push_back(
             static_cast<int>(stream_key(static_cast<std::uint64_t>(std::floor(cell.x()) + 4096),
@@ -300,7 +402,6 @@ ScanSamples sample_scan(const EstimationScene& scene, const FrameLookup& lookup,
                                         static_cast<std::uint64_t>(std::floor(cell.z()) + 4096)) &
                              0x7fffffff));
     }
-    find_extent(samples);
     samples.gathered = gather_light(scene, samples.points, options.gather_rays, see_through_mask,
                                     object_radiance, options.seed);
     return samples;

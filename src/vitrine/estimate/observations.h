@@ -22,6 +22,7 @@ class FrameLookup {
         Rgb radiance = Rgb::Zero();  ///< median over the views, per channel
         int views = 0;               ///< unoccluded and not saturated
         int saturated = 0;           ///< unoccluded but clipped
+        float footprint_m = 0.0f;    ///< of a pixel on the surface: `SurfacePoint::footprint_m`
     };
     /// Median radiance over all views that see the point past every part (candidates included).
     Seen observe(const SurfacePoint& point) const;
@@ -72,9 +73,10 @@ struct ScanSamples {
     int tried_count = 0;
 };
 
-/// Takes pixels evenly from all frames, drops those on candidates, at depth edges, clipped or
-/// inconsistent between views; then finds the plane, clusters, and gathers bounced light.
-/// Costs about 0.5 s for 4000 points on two cores.
+/// Takes half of the pixels evenly from all frames, the other half (by geometry alone, so that no
+/// observed value decides) from what stands on the plane and where its shadows can fall; drops
+/// those on candidates, at depth edges, clipped or inconsistent between views; then finds the
+/// plane, clusters, and gathers bounced light. Costs about 0.5 s for 4000 points on two cores.
 ScanSamples sample_scan(const EstimationScene& scene, const FrameLookup& lookup,
                         std::uint32_t see_through_mask, std::span<const Rgb> object_radiance,
                         const SampleOptions& options);

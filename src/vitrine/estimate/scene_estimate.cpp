@@ -81,6 +81,7 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
         timer = Timer();
         LightOptions again = first_light_options(capture, options);
         again.object_classes = classes_of(result.objects);
+        const std::string rival = result.light.rival;  // refining looks at no other place
         std::vector<DiscLight> start;
         for (const FittedLight& fitted : result.light.lights) start.push_back(fitted.light);
         again.start = start;
@@ -91,6 +92,7 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
         result.light = refine_light_jointly(scene, capture.frames, capture.saturation_level,
                                             refined, result.objects, again, options.materials,
                                             options.joint, &result.joint);
+        doubt_by_rival(result.light, rival);
         refit_specular(scene, capture.frames, capture.saturation_level, result.light,
                        options.materials, result.objects, progress.part(0.85, 1.0));
         result.error_joint = total_error(result.light, result.objects);

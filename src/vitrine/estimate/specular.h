@@ -39,6 +39,8 @@ struct KnownLight {
     std::vector<DiscLight> lights;
     Rgb ambient = Rgb::Zero();
     std::uint32_t opaque_mask = kScanMask;  ///< what shadows the object, itself included
+    /// Of the irradiance all lamps throw on the scene's middle, relative: reflectances share it.
+    double stddev_irradiance_ratio = 0.0;
 };
 
 struct WardFit {
@@ -82,6 +84,7 @@ class SpecularModel {
     /// Share of the pixels that some lamp reaches.
     double lit_share() const;
     const std::vector<ObjectPixel>& pixels() const { return pixels_; }
+    const KnownLight& light() const { return light_; }
     const std::vector<Rgb>& irradiance() const { return irradiance_; }
 
   private:

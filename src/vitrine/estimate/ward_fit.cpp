@@ -280,7 +280,7 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     const double corrected_by =
         std::sqrt(found.lobe.sigma_x * found.lobe.sigma_y) - fit.sigma.value;
     fit.sigma.stddev = std::hypot(fit.sigma.stddev, 0.5 * corrected_by);
-    add_model_error(fit);
+    add_model_error(fit, model.light().stddev_irradiance_ratio);
     if (options.is_certified) {
         WardBoundOptions bound;
         bound.sigma_min = options.sigma_min;

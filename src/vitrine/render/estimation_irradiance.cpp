@@ -31,6 +31,27 @@ struct Sums {
     float clear = 0, through = 0;
 };
 
+/// Where around a receiver its samples arrive: even over a square whose deviation is the footprint,
+/// its axes along those of the lamp's disc, so that the scouts' extremes of both add up.
+class Footprint {
+  public:
+    Footprint(const SurfacePoint& point, const Frame& disc) {
+        const float half = std::sqrt(3.0f) * point.footprint_m;
+        const Vec3f along = disc.tangent - point.normal.dot(disc.tangent) * point.normal;
+        const Vec3f across = disc.bitangent - point.normal.dot(disc.bitangent) * point.normal;
+        // One of them vanishes where the surface stands edge-on to the disc's axis.
+        const bool is_along = along.squaredNorm() > across.squaredNorm();
+        const Vec3f first = (is_along ? along : across).normalized();
+        const Vec3f second = point.normal.cross(first);
+        x_ = half * (is_along ? first : (second.dot(along) < 0.0f ? Vec3f(-second) : second));
+        y_ = half * (is_along ? (second.dot(across) < 0.0f ? Vec3f(-second) : second) : first);
+    }
+    Vec3f at(float x, float y) const { return x * x_ + y * y_; }  ///< x, y in [-1, 1]
+
+  private:
+    Vec3f x_, y_;
+};
+
 }  // namespace
 
 DirectColumn direct_column(const EstimationScene& scene, std::span<const SurfacePoint> points,
@@ -65,18 +86,22 @@ DirectColumn direct_column(const EstimationScene& scene, std::span<const Surface
     parallel_for(points.size(), 64, [&](std::size_t i) {
         const SurfacePoint& point = points[i];
         const Vec3f origin = point.position + scene.offset_m() * point.normal;
-        if (radius == 0.0f) {
+        if (radius == 0.0f && point.footprint_m == 0.0f) {
             Sums one;
             add_sample(point, origin, Vec2f::Zero(), one);
             column.clear[i] = one.clear;
             column.through[i] = one.through;
             return;
         }
+        const Footprint footprint(point, frame);
         Sums scouts;
         int lit = 0, dark = 0, behind = 0;
         for (int k = 0; k < kScoutSamples; ++k) {
             const Sums before = scouts;
-            add_sample(point, origin, pattern[static_cast<std::size_t>(k)], scouts);
+            const Vec2f& p = pattern[static_cast<std::size_t>(k)];
+            const Vec3f corner =
+                footprint.at(std::copysign(1.0f, p.x()), std::copysign(1.0f, p.y()));
+            add_sample(point, origin + corner, p, scouts);
             lit += scouts.clear > before.clear;
             behind += scouts.through > before.through;
             dark += scouts.clear == before.clear && scouts.through == before.through;
@@ -94,7 +119,9 @@ DirectColumn direct_column(const EstimationScene& scene, std::span<const Surface
         Sums sums;
         for (int k = 0; k < sample_count; ++k) {
             const Vec2f& p = pattern[static_cast<std::size_t>(kScoutSamples + k)];
-            add_sample(point, origin, Vec2f(c * p.x() - s * p.y(), s * p.x() + c * p.y()), sums);
+            const Vec2f q = r2_point(static_cast<std::size_t>(k), Vec2f::Zero());
+            const Vec3f from = origin + footprint.at(2.0f * q.x() - 1.0f, 2.0f * q.y() - 1.0f);
+            add_sample(point, from, Vec2f(c * p.x() - s * p.y(), s * p.x() + c * p.y()), sums);
         }
         column.clear[i] = sums.clear / static_cast<float>(sample_count);
         column.through[i] = sums.through / static_cast<float>(sample_count);

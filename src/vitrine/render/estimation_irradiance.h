@@ -25,6 +25,8 @@ struct DirectColumn {
         through;  ///< what reaches the point through a see-through part if that were air
 };
 
+/// A receiver with a footprint gets the mean over it: a pixel blurs a shadow's border as a larger
+/// lamp does.
 /// @param opaque_mask parts that block
 /// @param see_through_mask parts that may bend light: their shadow is kept apart
 /// @param sample_count disc samples where the penumbra is; 4 elsewhere

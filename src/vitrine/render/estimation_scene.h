@@ -55,6 +55,7 @@ class EstimationScene {
 struct SurfacePoint {
     Vec3f position = Vec3f::Zero();
     Vec3f normal = Vec3f(0, 0, 1);
+    float footprint_m = 0.0f;  ///< deviation, per axis of the surface, of what one value averages
 };
 
 }  // namespace vitrine
