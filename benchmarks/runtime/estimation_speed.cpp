@@ -1,9 +1,9 @@
 // vitrine_estimation_speed CAPTURE [PHOTONS]: estimation mode on the true meshes of a capture.
 //
 // For each clear object: columns of its caustic for 81 refractive indices (1.2 to 2.0) at all
-// pixels of all views that its light can reach, and how precisely the best index comes out: of
-// pictures that the whole renderer makes of the same scene for known indices, and of the capture's
-// own pictures, which another renderer made.
+// pixels of all views that its light can reach, a search around the best with six times the
+// photons, and how precisely the index comes out: of pictures that the whole renderer makes of the
+// same scene for known indices, and of the capture's own pictures, which another renderer made.
 #include "base/parallel.h"
 #include "cpu_time.h"
 #include "estimate/observations.h"
@@ -22,6 +22,8 @@ namespace {
 
 constexpr int kIndexCount = 81;
 constexpr double kRadius = 0.002;
+constexpr int kFinePhotons = 6;  // times as many as for the 81
+constexpr int kFineEvaluations = 8;
 
 struct Model {
     std::vector<Rgb> albedo, background;  // background: direct and bounced light, W/m2
@@ -43,18 +45,17 @@ struct Model {
     }
 };
 
-/// Best of the grid of columns, then golden section on columns made for it.
-double best_index(const Model& model, const CausticColumns& columns,
-                  const std::vector<double>& iors, const std::vector<std::vector<Rgb>>& grid,
-                  const std::vector<Rgb>& observed) {
+/// Best of the grid of columns, then golden section on columns of more photons.
+double best_index(const Model& model, const CausticColumns& fine, const std::vector<double>& iors,
+                  const std::vector<std::vector<Rgb>>& grid, const std::vector<Rgb>& observed) {
     std::size_t best = 0;
     std::vector<double> cost;
     for (const std::vector<Rgb>& column : grid) cost.push_back(model.cost(column, observed));
     for (std::size_t n = 1; n < cost.size(); ++n) best = cost[n] < cost[best] ? n : best;
     const double step = iors[1] - iors[0];
     return minimise_golden(
-               [&](double ior) { return model.cost(columns.at(ior, model.sigma_a), observed); },
-               iors[best] - step, iors[best] + step, 12)
+               [&](double ior) { return model.cost(fine.at(ior, model.sigma_a), observed); },
+               iors[best] - step, iors[best] + step, kFineEvaluations)
         .x;
 }
 
@@ -115,7 +116,7 @@ void measure(const Scene& scene, const EstimationScene& world, int object, const
 
     ViewReceivers receivers;
     std::shared_ptr<const ReceiverGrid> grid;
-    std::unique_ptr<CausticColumns> columns;
+    std::unique_ptr<CausticColumns> columns, fine;
     DirectColumn direct;
     GatheredLight gathered;
     std::vector<std::vector<Rgb>> trial;
@@ -139,6 +140,27 @@ void measure(const Scene& scene, const EstimationScene& world, int object, const
             std::make_unique<CausticColumns>(CausticBeam(world, object, light, opaque, beam), grid);
         trial = columns->at(iors, body.sigma_a_per_m);
     });
+    Model model;
+    model.intensity = lamp.intensity_w_per_sr;
+    model.sigma_a = body.sigma_a_per_m;
+    model.clip = static_cast<float>(capture.saturation_level);
+    std::vector<Rgb> observed(points.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        model.albedo.push_back(table.at(points[i].position));
+        model.background.push_back(direct.clear[i] * model.intensity + gathered.bounced[i] +
+                                   gathered.openness[i] * truth.ambient_radiance);
+        observed[i] = capture.frames[static_cast<std::size_t>(receivers.camera[i])]
+                          .colour(receivers.x[i], receivers.y[i])
+                          .min(model.clip);
+    }
+    double found_ior = 0;
+    const Cost search = cost_of([&] {
+        CausticBeamOptions beam;
+        beam.photon_count = kFinePhotons * photon_count;
+        fine =
+            std::make_unique<CausticColumns>(CausticBeam(world, object, light, opaque, beam), grid);
+        found_ior = best_index(model, *fine, iors, trial, observed);
+    });
     std::printf("%s: %zu pixels of %zu views, %d photons of which %zu meet it\n", body.name.c_str(),
                 points.size(), scene.cameras.size(), photon_count, columns->beam().met_count());
     const auto line = [](const char* what, const Cost& cost) {
@@ -149,40 +171,27 @@ void measure(const Scene& scene, const EstimationScene& world, int object, const
     line("shadow and direct light, once", shadow);
     line("bounced light, once", bounced);
     line("81 indices", trials);
-    line("together",
-         {found.cpu_s + prepared.cpu_s + shadow.cpu_s + bounced.cpu_s + trials.cpu_s,
-          found.wall_s + prepared.wall_s + shadow.wall_s + bounced.wall_s + trials.wall_s});
-
-    Model model;
-    model.intensity = lamp.intensity_w_per_sr;
-    model.sigma_a = body.sigma_a_per_m;
-    model.clip = static_cast<float>(capture.saturation_level);
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        model.albedo.push_back(table.at(points[i].position));
-        model.background.push_back(direct.clear[i] * model.intensity + gathered.bounced[i] +
-                                   gathered.openness[i] * truth.ambient_radiance);
+    line("search around the best, once", search);
+    Cost sum;
+    for (const Cost& cost : {found, prepared, shadow, bounced, trials, search}) {
+        sum.cpu_s += cost.cpu_s;
+        sum.wall_s += cost.wall_s;
     }
+    line("together", sum);
+
     for (const double ior : {1.33, 1.45, 1.5, 1.62, 1.75}) {
         const std::vector<Rgb> made =
             rendered_column(scene, world.part_of_object(object), ior, body.sigma_a_per_m, points);
-        std::vector<Rgb> observed(points.size());
         for (std::size_t i = 0; i < points.size(); ++i) {
             observed[i] = model.radiance(i, made[i] / model.intensity);
         }
-        const double best = best_index(model, *columns, iors, trial, observed);
+        const double best = best_index(model, *fine, iors, trial, observed);
         std::printf("  pictures made by the renderer for %.3f: best index %.4f, error %+.4f\n", ior,
                     best, best - ior);
         std::fflush(stdout);
     }
-    std::vector<Rgb> observed(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        observed[i] = capture.frames[static_cast<std::size_t>(receivers.camera[i])]
-                          .colour(receivers.x[i], receivers.y[i])
-                          .min(model.clip);
-    }
-    const double best = best_index(model, *columns, iors, trial, observed);
     std::printf("  the capture's pictures (true %.3f): best index %.4f, error %+.4f\n", body.ior,
-                best, best - body.ior);
+                found_ior, found_ior - body.ior);
 }
 
 }  // namespace
@@ -193,7 +202,7 @@ int main(int argc, char** argv) {
         return 2;
     }
     try {
-        const int photon_count = argc > 2 ? std::atoi(argv[2]) : 100'000;
+        const int photon_count = argc > 2 ? std::atoi(argv[2]) : 60'000;
         const Capture capture = read_capture(argv[1]);
         const TrueScene truth = read_truth(argv[1]);
         Scene scene = make_true_geometry(argv[1], capture);
