@@ -22,6 +22,7 @@ struct Options {
     std::string out;
     int samples = 64;
     double crease_deg = kCreaseDeg;
+    bool has_second_seed = false;
     DifferentialOptions differential;
 };
 
@@ -186,6 +187,12 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
     Timer timer;
     const DifferentialRenderer renderer(truth.scene, {read_truth_insert(folder)}, cameras,
                                         options.differential);
+    std::optional<DifferentialRenderer> second;
+    if (options.has_second_seed) {
+        DifferentialOptions other = options.differential;
+        ++other.seed;
+        second.emplace(truth.scene, std::vector<Part>{read_truth_insert(folder)}, cameras, other);
+    }
     std::printf("%s: photons %.1f s, met %.3f\n", options.insert.c_str(), timer.seconds(),
                 static_cast<double>(renderer.photon_balance().met) /
                     static_cast<double>(renderer.photon_balance().shot));
@@ -241,6 +248,22 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
             }
             std::printf("  object off glints %.3f  %.1f s\n", calm.error, seconds);
         }
+        if (second) {
+            const DifferentialImage twin = second->render(camera);
+            // Of one picture: half the variance of the difference of two.
+            ImageRgb off = gaussian_blur(raw_difference(twin.with, twin.without, top), kBlurPx);
+            for (std::size_t i = 0; i < off.size(); ++i) {
+                off[i] = d_true[i] + (off[i] - d_render[i]) * std::sqrt(0.5f);
+            }
+            const auto own = [&](const auto& inside) {
+                return region_error(d_true, off, 0, noise_variance, inside).error;
+            };
+            std::printf("%s %s our own noise: object %.3f darker %.3f brighter %.3f\n",
+                        camera.id.c_str(), options.insert.c_str(),
+                        own([&](std::size_t i) { return object[i] > 127; }),
+                        own([&](std::size_t i) { return is_changed(i) && d_true[i].sum() < 0; }),
+                        own([&](std::size_t i) { return is_changed(i) && d_true[i].sum() > 0; }));
+        }
         std::fflush(stdout);
         if (options.out.empty()) continue;
         const fs::path out = options.out;
@@ -267,6 +290,8 @@ int run(int argc, char** argv) {
     app.add_option("--noise-target", options.differential.noise_target, "See DifferentialOptions");
     app.add_option("--max-samples", options.differential.max_samples, "See DifferentialOptions");
     app.add_option("--crease-deg", options.crease_deg, "Smooth the real parts below this angle");
+    app.add_flag("--second-seed", options.has_second_seed,
+                 "Insert twice: what differs is our own noise");
     app.add_flag("--skip-plain", skip_plain, "Insertion alone");
     CLI11_PARSE(app, argc, argv);
     if (!options.out.empty()) fs::create_directories(options.out);

@@ -22,7 +22,7 @@ void SoftSums::add(const PathResult& path, bool finds_soft) {
     with += (path.soft.shadow + path.soft.diffuse) / path.soft.albedo.max(kLeastAlbedo);
     if (path.soft.hit_distance > 0) {
         ++hits;
-        inverse_distance += 1 / path.soft.hit_distance;
+        inverse_square += 1 / (path.soft.hit_distance * path.soft.hit_distance);
     }
 }
 
@@ -34,7 +34,7 @@ SoftPixel SoftSums::mean() const {
     if (count == 0) return pixel;
     const auto n = static_cast<float>(count);
     pixel.value = {with / n, shadow / n, diffuse / n, 1 / n, n};
-    pixel.inverse_distance_sum = inverse_distance;
+    pixel.inverse_square_sum = inverse_square;
     pixel.hits = hits;
     return pixel;
 }
@@ -93,7 +93,7 @@ void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sum
         }
         if (without.soft.hit_distance > 0) {
             ++soft.hits;
-            soft.inverse_distance += 1 / without.soft.hit_distance;
+            soft.inverse_square += 1 / (without.soft.hit_distance * without.soft.hit_distance);
         }
     }
     if (is_covered) {

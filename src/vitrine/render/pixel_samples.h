@@ -13,7 +13,7 @@ struct SoftSums {
     Rgb with = Rgb::Zero(), shadow = Rgb::Zero(), diffuse = Rgb::Zero();
     Rgb albedo = Rgb::Zero();  // of all samples, also those without soft light
     Vec3f position = Vec3f::Zero(), normal = Vec3f::Zero();
-    float inverse_distance = 0;
+    float inverse_square = 0;
     int hits = 0;
     int seen = 0;   // samples that show a plain diffuse surface
     int count = 0;  // and have found its soft light

@@ -39,14 +39,14 @@ Reach reach_of(const Image<SoftPixel>& pixels, const Camera& camera, const Vec3f
             if (!pixels.contains(x + dx, y + dy)) continue;
             const SoftPixel& other = pixels(x + dx, y + dy);
             if (!is_seen(other) || facing(pixel, other) <= 0) continue;
-            inverse += other.inverse_distance_sum;
+            inverse += other.inverse_square_sum;
             hits += static_cast<float>(other.hits);
         }
     }
     const Vec3f to_eye = eye - pixel.position;
     const float distance = to_eye.norm();
     Reach reach;
-    reach.sigma_m = hits > 0 ? kSigmaOfDistance * hits / inverse : distance;
+    reach.sigma_m = hits > 0 ? kSigmaOfDistance * std::sqrt(hits / inverse) : distance;
     const float cos_view = std::max(0.1f, std::abs(pixel.normal.dot(to_eye)) / distance);
     const float sigma_px = reach.sigma_m * static_cast<float>(camera.fx) * cos_view / distance;
     reach.variance_px2 = sigma_px * sigma_px;

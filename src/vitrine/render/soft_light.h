@@ -25,15 +25,15 @@ struct SoftValue {
 struct SoftPixel {
     SoftValue value;
     Vec3f position = Vec3f::Zero();
-    Vec3f normal = Vec3f::Zero();    ///< unit; zero: the pixel shows no such surface
-    float inverse_distance_sum = 0;  ///< 1/m, of the surfaces that paths from here met
-    int hits = 0;                    ///< how many did
+    Vec3f normal = Vec3f::Zero();  ///< unit; zero: the pixel shows no such surface
+    float inverse_square_sum = 0;  ///< of distances, 1/m2, to the surfaces that paths from here met
+    int hits = 0;                  ///< how many did
 };
 
 /// Replaces each value by a mean over neighbours in one plane with it, over a standard deviation of
-/// a tenth of the harmonic mean distance of what paths meet, and 18 pixels at most (an a-trous
-/// pyramid, Dammertz et al. 2010). A pixel without paths takes those of its neighbours.
-/// The variance becomes that of the mean. Costs about 1 us a pixel.
+/// a tenth of the mean distance of what paths meet, near things counting most, and 18 pixels at
+/// most (an a-trous pyramid, Dammertz et al. 2010). A pixel without paths takes those of its
+/// neighbours. The variance becomes that of the mean. Costs about 1 us a pixel.
 void average_soft_light(Image<SoftPixel>& pixels, const Camera& camera);
 
 }  // namespace vitrine

@@ -30,7 +30,7 @@ Image<SoftPixel> plane(float hit_m, const Value& value) {
             pixel.value.with = Rgb::Constant(value(x, y));
             pixel.value.variance = 1;
             pixel.value.weight = 2;
-            pixel.inverse_distance_sum = 2 / hit_m;
+            pixel.inverse_square_sum = 2 / (hit_m * hit_m);
             pixel.hits = 2;
         }
     }
