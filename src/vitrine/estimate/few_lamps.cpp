@@ -47,7 +47,8 @@ class Fit {
     }
 
     /// Kernels and intensities for given directions, from every length as a start.
-    FewLamps fit_kernels(const std::vector<Vec3>& directions) const {
+    FewLamps fit_kernels(const std::vector<Vec3>& directions,
+                         const std::vector<SeenAt>& seen_at) const {
         const LightFields fields = object_.fields(directions, true);
         // All channels at once: they differ in how the closed body weighs the same distances.
         const Index count = fields.source.cols();
@@ -66,6 +67,7 @@ class Fit {
         for (const double length : lengths_) {
             FewLamps trial;
             trial.directions = directions;
+            trial.seen_at = seen_at;
             trial.kernel.fill(single_exponential(length));
             for (int turn = 0; turn < kTurns; ++turn) {
                 solve_intensities(images_of(images, trial.kernel), trial);
@@ -104,12 +106,16 @@ class Fit {
         }
     }
 
-    /// Moves the directions not held to where the misfit is least, kernels kept.
-    void move(FewLamps& lamps, const std::vector<bool>& is_held, double first_step_deg) const {
+    /// Moves the directions to where the misfit is least, kernels kept; those of highlights not
+    /// far.
+    void move(FewLamps& lamps, double first_step_deg) const {
         const std::vector<KernelImage> operators = operators_of(lamps);
         std::array<MatrixXd, kChannels> images = kernel_images(lamps, operators);
         solve_intensities(images, lamps);
         const auto try_move = [&](std::size_t l, const Vec3& direction) {
+            const double reach = radians(options_.held_reach_deg);
+            if (lamps.seen_at[l] && angle_between(direction, *lamps.seen_at[l]) > reach)
+                return false;
             FewLamps trial = lamps;
             trial.directions[l] = direction;
             const LightFields fields = object_.fields({direction}, false);
@@ -126,7 +132,6 @@ class Fit {
             for (int round = 0; round < 4; ++round) {
                 bool has_moved = false;
                 for (std::size_t l = 0; l < lamps.directions.size(); ++l) {
-                    if (is_held[l]) continue;
                     const Vec3 centre = lamps.directions[l];
                     const Vec3 side = centre.unitOrthogonal(), up = centre.cross(side);
                     for (int k = 0; k < 6; ++k) {
@@ -213,8 +218,9 @@ class Fit {
         for (Index l = 0; l < count; ++l) {
             double price = options_.ground_price;
             if (l < count - 2) {
-                const Vec3& w = lamps.directions[static_cast<std::size_t>(l)];
-                price = options_.lamp_price * (1 + 3 * std::max(0.0, -w.z()));
+                const auto lamp = static_cast<std::size_t>(l);
+                price = options_.lamp_price * (1 + 3 * std::max(0.0, -lamps.directions[lamp].z()));
+                if (lamps.seen_at[lamp]) price = 0;
             } else if (l == count - 2) {
                 price = options_.ambient_price;
             }
@@ -248,36 +254,36 @@ class Fit {
 };
 
 /// Takes away the lamps that the picture hardly misses.
-void drop_needless(const Fit& fit, FewLamps& lamps, std::vector<bool>& is_held, double needless) {
+void drop_needless(const Fit& fit, FewLamps& lamps, double needless) {
     for (std::size_t l = lamps.directions.size(); l-- > 0;) {
-        if (is_held[l] || lamps.directions.size() == 1) continue;
+        if (lamps.seen_at[l] || lamps.directions.size() == 1) continue;
         std::vector<Vec3> fewer = lamps.directions;
+        std::vector<SeenAt> seen_at = lamps.seen_at;
         fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(l));
-        FewLamps without = fit.fit_kernels(fewer);
-        if (without.misfit > lamps.misfit * (1 + needless)) continue;
-        lamps = std::move(without);
-        is_held.erase(is_held.begin() + static_cast<std::ptrdiff_t>(l));
+        seen_at.erase(seen_at.begin() + static_cast<std::ptrdiff_t>(l));
+        FewLamps without = fit.fit_kernels(fewer, seen_at);
+        if (without.misfit <= lamps.misfit * (1 + needless)) lamps = std::move(without);
     }
 }
 
 }  // namespace
 
 FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
-                       const std::vector<Vec3>& start, std::vector<bool> is_held,
+                       const std::vector<Vec3>& start, const std::vector<SeenAt>& seen_at,
                        const FewLampsOptions& options) {
     Fit fit(object, exitance, ground_colour, options);
-    FewLamps lamps = fit.fit_kernels(start);
+    FewLamps lamps = fit.fit_kernels(start, seen_at);
     const auto settle = [&] {
         fit.set_bodies(lamps.kernel);
         fit.reweight(lamps);
-        lamps = fit.fit_kernels(lamps.directions);
+        lamps = fit.fit_kernels(lamps.directions, lamps.seen_at);
     };
     settle();
-    if (options.first_step_deg > 0) fit.move(lamps, is_held, options.first_step_deg);
+    if (options.first_step_deg > 0) fit.move(lamps, options.first_step_deg);
     settle();
-    drop_needless(fit, lamps, is_held, options.needless);
+    drop_needless(fit, lamps, options.needless);
     if (options.first_step_deg > 0) {
-        fit.move(lamps, is_held, 0.5 * options.first_step_deg);
+        fit.move(lamps, 0.5 * options.first_step_deg);
         settle();
     }
     lamps.relative_residual = fit.relative_residual(lamps);

@@ -5,6 +5,7 @@
 #include "optics/radial_profile.h"
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace vitrine {
@@ -12,18 +13,23 @@ namespace vitrine {
 struct FewLampsOptions {
     double shortest_px = 1, longest_px = 100;  ///< lengths that a kernel may be made of
     int length_count = 9;
-    double lamp_price = 0.006;    ///< quadratic price of a lamp; from behind up to 4 times that
+    double lamp_price = 0.006;    ///< quadratic price of a lamp not seen; from behind up to 4 times
     double ambient_price = 0.07;  ///< of light from everywhere
     double ground_price = 0.04;   ///< of light from below
     double first_step_deg = 8;    ///< of the search for better directions; 0: none
+    double held_reach_deg = 0;    ///< how far shading may move a lamp from where highlights show it
     double needless = 0.02;       ///< a lamp without which the misfit grows by less goes
     bool use_curved_body = true;  ///< optics/curved_body.h
 };
 
+/// Where highlights show a lamp: it is there, for nothing, and within `held_reach_deg`.
+using SeenAt = std::optional<Vec3>;
+
 /// Lamps and kernels that explain the picture together. Light is white but for the ground's.
 struct FewLamps {
     std::vector<Vec3> directions;
-    Eigen::VectorXd intensity;  ///< of the directions, then from everywhere, then from below
+    std::vector<SeenAt> seen_at;  ///< of each
+    Eigen::VectorXd intensity;    ///< of the directions, then from everywhere, then from below
     std::array<TwoExponentials, 3> kernel;  ///< with the albedos, up to the common factor
     double misfit = 1e300;                  ///< sum of squares, weighted, prices included
     double relative_residual = 0;           ///< rms
@@ -37,9 +43,9 @@ struct FewLamps {
 /// Kernels are found by variable projection (as in profile_fit.h) in turn with the intensities
 /// (non-negative least squares), from every length as a start; directions by pattern search.
 /// @param exitance observations x 3; a channel of zeros takes no part
-/// @param start directions to begin with; those `is_held` stay
+/// @param start directions to begin with
 FewLamps fit_few_lamps(const LitRelief& object, const Eigen::MatrixXd& exitance,
                        const Rgbd& ground_colour, const std::vector<Vec3>& start,
-                       std::vector<bool> is_held, const FewLampsOptions& options);
+                       const std::vector<SeenAt>& seen_at, const FewLampsOptions& options);
 
 }  // namespace vitrine

@@ -23,6 +23,9 @@ constexpr double kTypicalAlbedo = 0.6;
 constexpr double kGroundPrice = 2.0;
 /// Few lamps are cheaper than many.
 constexpr double kFewPrice = 0.3;
+/// Balls are round but for a few degrees, so that shading places lamps better than their mirror
+/// images do; on bumps that the relief lacks it does not. Half of what votes that agree may differ.
+constexpr double kClusterReachDeg = 6.0;
 /// Of the brightest channel's mean.
 constexpr double kDarkChannel = 0.05;
 
@@ -144,6 +147,22 @@ std::vector<bool> snap_to_highlights(std::vector<ViewLight>& lights,
         is_held[nearest] = true;
     }
     return is_held;
+}
+
+/// A glossy ball shows every lamp, a cluster shows each on most balls: where lamps were seen so
+/// often, those that no highlight tells of are not there.
+void drop_unseen(std::vector<ViewLight>& lights, std::vector<bool>& is_held,
+                 std::span<const HighlightLight> highlight_lights) {
+    constexpr int kManyVotes = 4;
+    const bool is_glossy =
+        std::any_of(highlight_lights.begin(), highlight_lights.end(),
+                    [](const HighlightLight& light) { return light.votes >= kManyVotes; });
+    if (!is_glossy) return;
+    for (std::size_t l = lights.size(); l-- > 0;) {
+        if (is_held[l] || lights.size() == 1) continue;
+        lights.erase(lights.begin() + static_cast<std::ptrdiff_t>(l));
+        is_held.erase(is_held.begin() + static_cast<std::ptrdiff_t>(l));
+    }
 }
 
 /// Mean colour of what surrounds the lower half of the object, luminance 1: what the ground throws
@@ -281,8 +300,10 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
 
     result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
                                         options.merge_deg, options.max_lights);
-    const std::vector<bool> is_held =
+    std::vector<bool> is_held =
         snap_to_highlights(result.lights.lights, highlight_lights, options.merge_deg);
+
+    if (relief.is_cluster()) drop_unseen(result.lights.lights, is_held, highlight_lights);
 
     FewLampsOptions few;
     few.shortest_px = g_low;
@@ -292,11 +313,16 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     few.ground_price = price[count + 1];
     few.first_step_deg = options.polish_deg;
     few.use_curved_body = options.use_curved_body;
+    if (relief.is_cluster()) few.held_reach_deg = kClusterReachDeg;
     const Rgbd ground = ground_colour(diffuse, relief);
     std::vector<Vec3> start;
-    for (const ViewLight& light : result.lights.lights) start.push_back(light.direction);
+    std::vector<SeenAt> seen_at;
+    for (std::size_t l = 0; l < is_held.size(); ++l) {
+        start.push_back(result.lights.lights[l].direction);
+        seen_at.push_back(is_held[l] ? SeenAt(start.back()) : std::nullopt);
+    }
     const FewLamps lamps =
-        fit_few_lamps(object, without_dark_channels(exitance), ground, start, is_held, few);
+        fit_few_lamps(object, without_dark_channels(exitance), ground, start, seen_at, few);
     progress.update(1.0, "lights: directions");
     set_lights(lamps, ground, result);
     if (result.lights.total() <= 0) {

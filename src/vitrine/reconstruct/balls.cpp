@@ -323,6 +323,36 @@ std::vector<Ball> find_balls(const ImageRgb& picture, const Mask& mask,
     return balls;
 }
 
+namespace {
+
+/// A bunch goes on behind what is seen of it. Balls at its outline lie about in the middle of its
+/// depth; those in front of them have likenesses behind.
+std::vector<Ball> unseen_behind(const Relief& relief, const std::vector<Ball>& balls) {
+    const ImageF inside = distance_to(mask_not(relief.mask));
+    std::vector<double> on_outline(balls.size(), 0.0);
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+        const std::int16_t ball = relief.ball_of[i];
+        if (ball >= 0 && inside[i] > 0 && inside[i] < 1.5f)
+            on_outline[static_cast<std::size_t>(ball)] += 1;
+    }
+    double sum = 0, weight = 0;
+    for (std::size_t k = 0; k < balls.size(); ++k) {
+        sum += on_outline[k] * balls[k].centre_px.z();
+        weight += on_outline[k];
+    }
+    const auto middle = static_cast<float>(sum / std::max(weight, 1.0));
+    std::vector<Ball> unseen;
+    for (const Ball& ball : balls) {
+        const float before = ball.centre_px.z() - middle;
+        if (before < 0.5f * ball.radius_px) continue;
+        unseen.push_back(ball);
+        unseen.back().centre_px.z() = middle - before;
+    }
+    return unseen;
+}
+
+}  // namespace
+
 Relief relief_of_balls(const Mask& mask, std::vector<Ball> balls) {
     VITRINE_CHECK(!balls.empty());
     Relief relief;
@@ -362,6 +392,7 @@ Relief relief_of_balls(const Mask& mask, std::vector<Ball> balls) {
             }
         }
     }
+    relief.unseen_balls = unseen_behind(relief, balls);
     relief.balls = std::move(balls);
     return relief;
 }

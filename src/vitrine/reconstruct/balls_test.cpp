@@ -79,6 +79,16 @@ TEST(Balls, ClusterIsFoundAndStacked) {
     EXPECT_LT(degrees(error / count), 5);
 }
 
+TEST(Balls, ABunchGoesOnBehindWhatIsSeen) {
+    // Two balls make the outline; the one before them has a likeness as far behind.
+    const std::vector<Ball> balls = {
+        {Vec3f(85, -100, 0), 50}, {Vec3f(165, -100, 0), 50}, {Vec3f(125, -100, 50), 25}};
+    const Relief relief = relief_of_balls(picture_of(balls).mask, balls);
+    ASSERT_EQ(relief.unseen_balls.size(), 1u);
+    EXPECT_LT((relief.unseen_balls[0].centre_px - Vec3f(125, -100, -50)).norm(), 2);
+    EXPECT_EQ(relief.balls.size(), 3u);
+}
+
 TEST(Balls, OneBodyIsNoCluster) {
     Picture picture = picture_of({{Vec3f(130, -110, 0), 90}});
     EXPECT_TRUE(find_balls(picture.shown, picture.mask).empty());

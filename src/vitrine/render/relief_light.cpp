@@ -2,21 +2,24 @@
 
 #include "base/parallel.h"
 
+#include <algorithm>
+
 namespace vitrine {
 namespace {
 
+bool is_in_the_way(const Ball& ball, const Vec3f& point, const Vec3f& direction) {
+    const Vec3f to_centre = ball.centre_px - point;
+    const float along = to_centre.dot(direction);
+    return along > 0 &&
+           (to_centre - along * direction).squaredNorm() < ball.radius_px * ball.radius_px;
+}
+
 bool is_hidden_by_balls(const Relief& relief, std::size_t own, const Vec3f& point,
                         const Vec3f& direction) {
-    for (std::size_t k = 0; k < relief.balls.size(); ++k) {
-        if (k == own) continue;
-        const Ball& ball = relief.balls[k];
-        const Vec3f to_centre = ball.centre_px - point;
-        const float along = to_centre.dot(direction);
-        if (along <= 0) continue;
-        if ((to_centre - along * direction).squaredNorm() < ball.radius_px * ball.radius_px)
-            return true;
-    }
-    return false;
+    for (std::size_t k = 0; k < relief.balls.size(); ++k)
+        if (k != own && is_in_the_way(relief.balls[k], point, direction)) return true;
+    return std::any_of(relief.unseen_balls.begin(), relief.unseen_balls.end(),
+                       [&](const Ball& ball) { return is_in_the_way(ball, point, direction); });
 }
 
 bool is_hidden_by_relief(const Relief& relief, float top, const Vec3f& point, const Vec3f& normal,

@@ -134,6 +134,9 @@ TEST(Translucent, ObjectShadowsItself) {
     const SurfacePoints points{position, normal, ball_index};
     EXPECT_EQ(visibility(cluster, points, Vec3(-1, 0, 0)), (std::vector<float>{1, 0, 0}));
     EXPECT_EQ(visibility(cluster, points, Vec3(1, 0, 0)), (std::vector<float>{0, 0, 1}));
+    Relief bunch = cluster;
+    bunch.unseen_balls = {{Vec3f(-30, -50, 0), 30}};
+    EXPECT_EQ(visibility(bunch, points, Vec3(-1, 0, 0)), (std::vector<float>{0, 0, 0}));
     const SkyShares sky = sky_shares(cluster, points);
     EXPECT_FLOAT_EQ(sky.ambient[0], 1);
     EXPECT_LT(sky.ambient[1], 0.95f);

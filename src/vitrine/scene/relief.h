@@ -29,6 +29,8 @@ struct Relief {
     /// A cluster: light travels inside each ball, not from one to the next. Empty: one body, its
     /// back the mirror of its front.
     std::vector<Ball> balls;
+    /// Behind those: what no pixel shows, a guess. They only cast shadows.
+    std::vector<Ball> unseen_balls;
     Image<std::int16_t> ball_of;  ///< which ball a pixel shows; -1: none. Empty without balls
 
     /// Height of the unseen back.
