@@ -87,6 +87,30 @@ LightSet settled(const LightFit& fit, LightSet pair, RefineOptions options) {
     return pair;
 }
 
+/// Whoever starts with a small lamp stays there: penumbrae narrower than a sample's footprint all
+/// look alike. So lamps several times smaller and larger are tried too.
+LightSet with_best_radii(const LightFit& fit, LightSet set, RefineOptions options) {
+    constexpr double kMaxRadiusPerDistance = 0.3;
+    const double cost_before = set.score.cost;
+    for (std::size_t k = 0; k < set.lights.size(); ++k) {
+        LightSet best = set;
+        for (const double factor : {0.25, 0.5, 2.0, 4.0}) {
+            LightSet trial = set;
+            PolarLight& light = trial.lights[k];
+            light.radius_m *= factor;
+            if (light.radius_m > kMaxRadiusPerDistance * light.distance_m) continue;
+            trial.score =
+                fit.score(columns_of(fit, trial.lights, options.disc_samples, options.stride),
+                          options.stride, kLuminance);
+            if (trial.score.cost < best.score.cost) best = std::move(trial);
+        }
+        set = std::move(best);
+    }
+    if (set.score.cost == cost_before) return set;
+    options.keep_distances = has_distant(fit, set);
+    return refine_lights(fit, set, options);
+}
+
 /// Whether the last light is strong enough and apart enough to be one of its own.
 bool is_light_of_its_own(const LightSet& set) {
     double total = 0.0, least = 1e30;
@@ -143,6 +167,7 @@ FoundLights find_lights(const LightFit& fit, const LightOptions& options,
         refined(fit, distinct(singles, kStartSeparationRad, kStarts), scout(70));
     std::vector<LightSet> finalists =
         refined(fit, distinct(ends, kBasinRad, kFinalists), fine(140));
+    finalists.front() = with_best_radii(fit, finalists.front(), fine(140));
     found.set = finalists.front();
     found.rival = rival_of(fit, finalists);
     progress.update(0.5, "looking for a second light");
@@ -157,7 +182,8 @@ FoundLights find_lights(const LightFit& fit, const LightOptions& options,
         if (starts.empty()) break;
         finalists =
             refined(fit, distinct(refined(fit, starts, scout(150)), kBasinRad, 2), fine(260));
-        finalists.front() = settled(fit, finalists.front(), fine(260));
+        finalists.front() =
+            with_best_radii(fit, settled(fit, finalists.front(), fine(260)), fine(260));
         const LightSet& more = finalists.front();
         const double gain = gain_of(more, found.set);
         const double evidence = evidence_over(fit, more, found.set);
