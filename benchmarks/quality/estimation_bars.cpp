@@ -26,18 +26,6 @@ std::string pair_of(const char* format, double found, double truth) {
     return text;
 }
 
-const FittedLight* nearest_light(const TrueScene& truth, const DiscLight& light,
-                                 const LightEstimate& estimate) {
-    const FittedLight* nearest = nullptr;
-    double least = 1e9;
-    for (const FittedLight& fitted : estimate.lights) {
-        const double angle = angle_between(light.position_m - truth.reference_point_m,
-                                           fitted.light.position_m - truth.reference_point_m);
-        if (angle < least) least = angle, nearest = &fitted;
-    }
-    return nearest;
-}
-
 /// Beckmann lobe with Smith's masking as the captures were made with (their README), per unit
 /// rho_s: D G / (4 cos_i cos_o).
 double beckmann_lobe(const Vec3& wo, const Vec3& wi, double alpha) {
@@ -111,9 +99,21 @@ void add_glass_bars(const std::string& capture, const TrueObject& truth,
 
 }  // namespace
 
+const FittedLight* nearest_found(const TrueScene& truth, const DiscLight& light,
+                                 const LightEstimate& estimate) {
+    const FittedLight* nearest = nullptr;
+    double least = 1e9;
+    for (const FittedLight& fitted : estimate.lights) {
+        const double angle = angle_between(light.position_m - truth.reference_point_m,
+                                           fitted.light.position_m - truth.reference_point_m);
+        if (angle < least) least = angle, nearest = &fitted;
+    }
+    return nearest;
+}
+
 double light_error_deg(const TrueScene& truth, const DiscLight& light,
                        const LightEstimate& estimate) {
-    const FittedLight* fitted = nearest_light(truth, light, estimate);
+    const FittedLight* fitted = nearest_found(truth, light, estimate);
     if (!fitted) return 180.0;
     return degrees(angle_between(light.position_m - truth.reference_point_m,
                                  fitted->light.position_m - truth.reference_point_m));
@@ -135,7 +135,7 @@ void add_light_bars(const std::string& capture, const TrueScene& truth,
                                 static_cast<double>(truth.lights.size()))));
     std::vector<double> ratio;
     for (const DiscLight& light : truth.lights) {
-        const FittedLight* fitted = nearest_light(truth, light, estimate);
+        const FittedLight* fitted = nearest_found(truth, light, estimate);
         if (!fitted) continue;
         const Vec3 found = fitted->light.position_m - truth.reference_point_m;
         const Vec3 is = light.position_m - truth.reference_point_m;

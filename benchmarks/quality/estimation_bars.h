@@ -32,6 +32,9 @@ void add_object_bars(const std::string& capture, const TrueScene& truth, const S
 void add_mean_bars(const std::vector<double>& light_errors_deg,
                    const std::vector<double>& grid_errors_deg, std::vector<Bar>& bars);
 
+/// Of the lights found the one nearest to a true one in direction; null when none was found.
+const FittedLight* nearest_found(const TrueScene& truth, const DiscLight& light,
+                                 const LightEstimate& estimate);
 double light_error_deg(const TrueScene& truth, const DiscLight& light,
                        const LightEstimate& estimate);
 double grid_error_deg(const TrueScene& truth, const LightEstimate& estimate);

@@ -28,26 +28,23 @@ void print_lights(const TrueScene& truth, const LightEstimate& estimate) {
         estimate.reference_point_m.y(), estimate.reference_point_m.z());
     std::printf("  best of the 36 grid lights: direction error %.2f deg\n",
                 grid_error_deg(truth, estimate));
-    for (const FittedLight& fitted : estimate.lights) {
-        const DiscLight* nearest = nullptr;
-        double error = 1e30;
-        for (const DiscLight& light : truth.lights) {
-            const double e = angle_between(light.position_m - truth.reference_point_m,
-                                           fitted.light.position_m - truth.reference_point_m);
-            if (e < error) error = e, nearest = &light;
-        }
+    std::printf("  %zu lights found, %zu true\n", estimate.lights.size(), truth.lights.size());
+    for (const DiscLight& light : truth.lights) {
+        const FittedLight* nearest = nearest_found(truth, light, estimate);
+        if (!nearest) continue;
+        const FittedLight& fitted = *nearest;
         const Vec3 d = fitted.light.position_m - truth.reference_point_m;
-        const Vec3 t = nearest->position_m - truth.reference_point_m;
+        const Vec3 t = light.position_m - truth.reference_point_m;
         std::printf(
             "  light: direction error %.2f deg (sd %.2f), elevation error %.2f, distance %.3f "
             "(true %.3f, %+.1f %%, sd %.3f), radius %.3f (%.3f), intensity ratio %.3f %.3f %.3f\n",
-            degrees(error), fitted.stddev_direction_deg,
+            light_error_deg(truth, light, estimate), fitted.stddev_direction_deg,
             std::abs(degrees(std::asin(d.normalized().z()) - std::asin(t.normalized().z()))),
             d.norm(), t.norm(), 100 * (d.norm() / t.norm() - 1), fitted.stddev_distance_m,
-            fitted.light.radius_m, nearest->radius_m,
-            fitted.light.intensity_w_per_sr[0] / nearest->intensity_w_per_sr[0],
-            fitted.light.intensity_w_per_sr[1] / nearest->intensity_w_per_sr[1],
-            fitted.light.intensity_w_per_sr[2] / nearest->intensity_w_per_sr[2]);
+            fitted.light.radius_m, light.radius_m,
+            fitted.light.intensity_w_per_sr[0] / light.intensity_w_per_sr[0],
+            fitted.light.intensity_w_per_sr[1] / light.intensity_w_per_sr[1],
+            fitted.light.intensity_w_per_sr[2] / light.intensity_w_per_sr[2]);
     }
 }
 

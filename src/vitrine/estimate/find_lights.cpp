@@ -75,23 +75,12 @@ RefineOptions fine(int evaluations) {
     return {.stride = 1, .disc_samples = 16, .max_evaluations = evaluations, .step_rad = 0.04};
 }
 
-/// Ten unknowns: one simplex stalls, a fresh one goes on.
-LightSet settled(const LightFit& fit, LightSet pair, RefineOptions options) {
-    options.keep_distances = has_distant(fit, pair);
-    for (int again = 0; again < kRestarts; ++again) {
-        const LightSet next = refine_lights(fit, pair, options);
-        const bool has_settled = next.score.cost > kSettled * pair.score.cost;
-        if (next.score.cost < pair.score.cost) pair = next;
-        if (has_settled) break;
-    }
-    return pair;
-}
-
-/// Whoever starts with a small lamp stays there: penumbrae narrower than a sample's footprint all
-/// look alike. So lamps several times smaller and larger are tried too.
-LightSet with_best_radii(const LightFit& fit, LightSet set, RefineOptions options) {
+/// Lamps several times smaller and larger are tried, since penumbrae narrower than a sample's
+/// footprint all look alike and a simplex stays with what it started from. But only where the scan
+/// insists: on a flat stretch the least cost is chance.
+LightSet with_likely_radii(const LightFit& fit, LightSet set, const RefineOptions& options) {
     constexpr double kMaxRadiusPerDistance = 0.3;
-    const double cost_before = set.score.cost;
+    constexpr double kRadiusEvidence = 1.0;  // deviations from block to block
     for (std::size_t k = 0; k < set.lights.size(); ++k) {
         LightSet best = set;
         for (const double factor : {0.25, 0.5, 2.0, 4.0}) {
@@ -102,13 +91,30 @@ LightSet with_best_radii(const LightFit& fit, LightSet set, RefineOptions option
             trial.score =
                 fit.score(columns_of(fit, trial.lights, options.disc_samples, options.stride),
                           options.stride, kLuminance);
-            if (trial.score.cost < best.score.cost) best = std::move(trial);
+            if (trial.score.cost < best.score.cost &&
+                evidence_over(fit, trial, set) >= kRadiusEvidence)
+                best = std::move(trial);
         }
         set = std::move(best);
     }
-    if (set.score.cost == cost_before) return set;
+    return set;
+}
+
+/// Refined again from where it ended until that gains no more: one simplex stalls, a fresh one goes
+/// on.
+LightSet settled(const LightFit& fit, const LightSet& start, RefineOptions options) {
+    LightSet set = with_likely_radii(fit, start, options);
     options.keep_distances = has_distant(fit, set);
-    return refine_lights(fit, set, options);
+    const bool is_moved = set.score.cost < start.score.cost;
+    // One lamp's four unknowns settle at once; two lamps have ten.
+    const int restarts = set.lights.size() > 1 ? kRestarts : is_moved ? 1 : 0;
+    for (int again = 0; again < restarts; ++again) {
+        const LightSet next = refine_lights(fit, set, options);
+        const bool has_settled = next.score.cost > kSettled * set.score.cost;
+        if (next.score.cost < set.score.cost) set = next;
+        if (has_settled) break;
+    }
+    return set;
 }
 
 /// Whether the last light is strong enough and apart enough to be one of its own.
@@ -167,7 +173,7 @@ FoundLights find_lights(const LightFit& fit, const LightOptions& options,
         refined(fit, distinct(singles, kStartSeparationRad, kStarts), scout(70));
     std::vector<LightSet> finalists =
         refined(fit, distinct(ends, kBasinRad, kFinalists), fine(140));
-    finalists.front() = with_best_radii(fit, finalists.front(), fine(140));
+    finalists.front() = settled(fit, finalists.front(), fine(140));
     found.set = finalists.front();
     found.rival = rival_of(fit, finalists);
     progress.update(0.5, "looking for a second light");
@@ -182,8 +188,7 @@ FoundLights find_lights(const LightFit& fit, const LightOptions& options,
         if (starts.empty()) break;
         finalists =
             refined(fit, distinct(refined(fit, starts, scout(150)), kBasinRad, 2), fine(260));
-        finalists.front() =
-            with_best_radii(fit, settled(fit, finalists.front(), fine(260)), fine(260));
+        finalists.front() = settled(fit, finalists.front(), fine(260));
         const LightSet& more = finalists.front();
         const double gain = gain_of(more, found.set);
         const double evidence = evidence_over(fit, more, found.set);

@@ -1,5 +1,6 @@
 #include "estimate/light_outcome.h"
 
+#include "base/log.h"
 #include "estimate/model_error.h"
 
 #include <cmath>
@@ -32,6 +33,8 @@ FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_
     fitted.is_distant = is_distant;
     const LightDeviation deviation = light_deviation(fit, set, k);
     const LampError& model = model_error_of(set, k);
+    log_debug("light {}: resampled deviations of angle {:.5f} rad, distance {:.4f}, radius {:.3f}",
+              k, deviation.direction_rad, deviation.log_distance, deviation.log_radius);
     const double log_distance = std::hypot(deviation.log_distance, model.log_distance);
     fitted.stddev_direction_deg =
         degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, model.direction_rad));

@@ -20,7 +20,9 @@ constexpr double kMinElevationSine = 0.05;  // lower lights graze the table and 
 constexpr double kFirstRadiusPerMetre = 0.04;
 constexpr double kMinDistancePerRadius = 0.8, kMaxDistancePerRadius = 12.0;
 constexpr double kPenalty = 10.0;
-constexpr double kUnknownLog = 0.7;  // deviation of a logarithm that nothing shows: a factor of two
+// Deviation of a logarithm that nothing shows: a factor of two, more or less.
+constexpr double kUnknownLog = 0.7;
+constexpr int kDiscSamples = 16;       // of lamps that losses are compared for
 constexpr double kBoundMargin = 1.05;  // this near its end of the range, a light lies at it
 
 Vec3 tilted(const Vec3& direction, double x, double y) {
@@ -41,9 +43,10 @@ bool is_flat(const Matrix& hessian, int a) {
 }
 
 /// Inverse of the curvature. Unlike quantities are scaled to unit curvature first; what does not
-/// curve at all is left out (zeros), and no combination is taken to be vaguer than 1 / kMinShare.
+/// curve at all is left out (zeros), and no combination is taken to be vaguer than 1 / kMinShare:
+/// less is the noise of second differences.
 Matrix inverse_of(const Matrix& hessian) {
-    constexpr double kMinShare = 0.05;
+    constexpr double kMinShare = 0.15;
     Vector scale = Vector::Zero();
     for (int a = 0; a < kCount; ++a)
         if (!is_flat(hessian, a)) scale[a] = 1.0 / std::sqrt(hessian(a, a));
@@ -228,7 +231,6 @@ LightSet at_distance(const LightFit& fit, const LightSet& set, std::size_t k, do
 }
 
 double evidence_over(const LightFit& fit, const LightSet& better, const LightSet& worse) {
-    constexpr int kDiscSamples = 16;
     std::vector<double> better_loss, worse_loss, weight;
     fit.losses(columns_of(fit, better.lights, kDiscSamples, 1), 1, kLuminance, better.score,
                better_loss, weight);
@@ -246,9 +248,10 @@ double evidence_over(const LightFit& fit, const LightSet& better, const LightSet
 }
 
 LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k) {
-    // Steps wide enough to cross several samples at every shadow border.
-    const Vector steps(0.02, 0.02, 0.08, 0.3);
-    constexpr int kDiscSamples = 16;
+    // Shadows' borders cross samples one by one, so second differences are noisy like one over the
+    // square of the step: with half of these the curvature is often singular by chance, and
+    // deviations come out up to ten times too large.
+    const Vector steps(0.04, 0.04, 0.16, 0.6);
     std::vector<double> weight;
     const auto evaluate = [&](const Vector& x, std::vector<double>& loss) {
         std::vector<PolarLight> lights = set.lights;
@@ -288,8 +291,10 @@ LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::si
     for (int a = 0; a < kCount; ++a) {
         for (int b = a + 1; b < kCount; ++b) {
             const Vector step = steps[a] * Vector::Unit(a) + steps[b] * Vector::Unit(b);
-            const double both = evaluate(step, plus);
-            hessian(a, b) = hessian(b, a) = (both - up[a] - up[b] + centre) / (steps[a] * steps[b]);
+            const double both = evaluate(step, unused) + evaluate(-step, unused);
+            hessian(a, b) = hessian(b, a) =
+                (both - up[a] - down[a] - up[b] - down[b] + 2.0 * centre) /
+                (2.0 * steps[a] * steps[b]);
         }
     }
     LightDeviation deviation;
@@ -303,10 +308,20 @@ LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::si
         const Vector s = sum / total_weight;
         meat += s * s.transpose();
     }
+    // Before any picture distance and radius are known within a factor or two, which keeps a
+    // penumbra that says nothing of the radius from making the direction vague as well. The loss
+    // becomes a likelihood by the scale at which curvature and scatter of the angles agree.
+    const double scale = (hessian(0, 0) + hessian(1, 1)) / std::max(meat(0, 0) + meat(1, 1), 1e-30);
+    if (deviation.is_identifiable)
+        for (const int a : {2, 3}) {
+            const double prior = 1.0 / (scale * kUnknownLog * kUnknownLog);
+            hessian(a, a) = std::max(hessian(a, a), 0.0) + prior;
+            meat(a, a) += prior / scale;
+        }
     const Matrix inverse = inverse_of(hessian);
     const Matrix covariance = inverse * meat * inverse;
     const auto deviation_of = [&](int a) {
-        return is_flat(hessian, a) ? kUnknownLog : std::sqrt(std::max(0.0, covariance(a, a)));
+        return deviation.is_identifiable ? std::sqrt(std::max(0.0, covariance(a, a))) : kUnknownLog;
     };
     deviation.direction_rad = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
     deviation.log_distance = deviation_of(2);

@@ -11,16 +11,19 @@ namespace vitrine {
 
 /// Of one lamp.
 struct LampError {
-    double direction_rad;  ///< per axis
+    double direction_rad;  ///< of the whole angle
     double log_distance;
     double log_irradiance;  ///< the intensity's beside what follows from the distance
 };
-constexpr LampError kSingleLamp = {0.009, 0.02, 0.045};
-// Of several lamps each may stand nearer and weaker while another makes up for it; the weaker one
-// shows in little but its own shadows.
-constexpr LampError kStrongestLamp = {0.009, 0.035, 0.045};
-constexpr LampError kWeakerLamp = {0.022, 0.085, 0.14};
-constexpr double kModelLogRadius = 0.22;
+// Waves of paint wider than a patch look like a nearer or a further lamp; the known albedo is read
+// at one spot. Directions of a single lamp are as good as resampling says.
+constexpr LampError kSingleLamp = {0.0, 0.02, 0.02};
+// Of several lamps each may stand a little off while another makes up for it; the weaker one shows
+// in little but its own shadows.
+constexpr LampError kStrongestLamp = {0.008, 0.02, 0.03};
+constexpr LampError kWeakerLamp = {0.012, 0.02, 0.06};
+// Penumbrae are about as narrow as what a pixel sees of the table.
+constexpr double kModelLogRadius = 0.15;
 
 // Index: grows with the residual, which is large where the hull is off.
 constexpr double kModelIorPerCost = 0.25;

@@ -280,6 +280,12 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     const double corrected_by =
         std::sqrt(found.lobe.sigma_x * found.lobe.sigma_y) - fit.sigma.value;
     fit.sigma.stddev = std::hypot(fit.sigma.stddev, 0.5 * corrected_by);
+    log_debug(
+        "ward: sigma {:.4f} +- {:.4f}, corrected by {:.4f}; rho_d {:.4f} +- {:.4f}, rho_s {:.4f} "
+        "+- {:.4f}, lobe share {:.3f}, light {:.3f}, pixels {}, clipped {}",
+        fit.sigma.value, fit.sigma.stddev, corrected_by, fit.ward.rho_d[1], fit.stddev_rho_d[1],
+        fit.ward.rho_s[1], fit.stddev_rho_s[1], fit.lobe_share,
+        model.light().stddev_irradiance_ratio, fit.pixel_count, fit.censored_count);
     add_model_error(fit, model.light().stddev_irradiance_ratio);
     if (options.is_certified) {
         WardBoundOptions bound;

@@ -5,12 +5,14 @@
 #include "math/sampling.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace vitrine {
 
 namespace {
 
-constexpr int kScoutSamples = 4;  // if these agree, the point is in full light or full shadow
+constexpr float kMinRayCos = 0.1f;  // flatter rays start ten offsets away, not more
+constexpr int kScoutSamples = 4;    // if these agree, the point is in full light or full shadow
 
 /// Points of the unit disc: scouts first, near the rim at four sides, then an even spiral.
 std::vector<Vec2f> disc_pattern(int count) {
@@ -75,17 +77,20 @@ DirectColumn direct_column(const EstimationScene& scene, std::span<const Surface
         const float cos_s = point.normal.dot(to_light) / d;
         const float cos_l = -frame.normal.dot(to_light) / d;
         if (cos_s <= 0.0f || cos_l <= 0.0f) return;
-        if (scene.accel().is_occluded({origin, to_light, 0.0f, 1.0f, opaque_mask})) return;
+        // Clear of the roughness, but on the line from the surface to the lamp: a lifted origin
+        // would shorten every shadow and so raise every lamp by half a degree.
+        const float near = scene.offset_m() / (std::max(cos_s, kMinRayCos) * d);
+        if (scene.accel().is_occluded({origin, to_light, near, 1.0f, opaque_mask})) return;
         const float e = cos_s * cos_l / d2;
         const bool is_through =
             see_through_mask != 0 &&
-            scene.accel().is_occluded({origin, to_light, 0.0f, 1.0f, see_through_mask});
+            scene.accel().is_occluded({origin, to_light, near, 1.0f, see_through_mask});
         (is_through ? sums.through : sums.clear) += e;
     };
 
     parallel_for(points.size(), 64, [&](std::size_t i) {
         const SurfacePoint& point = points[i];
-        const Vec3f origin = point.position + scene.offset_m() * point.normal;
+        const Vec3f& origin = point.position;
         if (radius == 0.0f && point.footprint_m == 0.0f) {
             Sums one;
             add_sample(point, origin, Vec2f::Zero(), one);
@@ -113,14 +118,21 @@ DirectColumn direct_column(const EstimationScene& scene, std::span<const Surface
             column.through[i] = scouts.through / kScoutSamples;
             return;
         }
-        // The spiral is turned by a fixed angle per point: no two share their banding.
-        const float turn = 2.0f * kPif * static_cast<float>(mix_bits(i) >> 40) * 0x1p-24f;
+        // The spiral is turned by a fixed angle per point, the footprint's samples shifted: no two
+        // points share their banding.
+        const float part = static_cast<float>(mix_bits(i) >> 40) * 0x1p-24f;
+        const float turn = 2.0f * kPif * part;
         const float c = std::cos(turn), s = std::sin(turn);
         Sums sums;
         for (int k = 0; k < sample_count; ++k) {
             const Vec2f& p = pattern[static_cast<std::size_t>(kScoutSamples + k)];
-            const Vec2f q = r2_point(static_cast<std::size_t>(k), Vec2f::Zero());
-            const Vec3f from = origin + footprint.at(2.0f * q.x() - 1.0f, 2.0f * q.y() - 1.0f);
+            // Two by two on opposite sides: a mean off the middle would move every shadow, and with
+            // them the lamp.
+            const Vec2f q = r2_point(static_cast<std::size_t>(k / 2),
+                                     Vec2f(part, std::fmod(7.0f * part, 1.0f)));
+            const float side = k % 2 == 0 ? 1.0f : -1.0f;
+            const Vec3f from =
+                origin + side * footprint.at(2.0f * q.x() - 1.0f, 2.0f * q.y() - 1.0f);
             add_sample(point, from, Vec2f(c * p.x() - s * p.y(), s * p.x() + c * p.y()), sums);
         }
         column.clear[i] = sums.clear / static_cast<float>(sample_count);

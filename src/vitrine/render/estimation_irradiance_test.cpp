@@ -55,6 +55,39 @@ TEST(DirectColumn, AFootprintIsTheMeanOverPlacesAround) {
     EXPECT_GT(blurred_by, 0.1 * open);
 }
 
+TEST(DirectColumn, FewSamplesDoNotMoveAShadowsBorder) {
+    constexpr float kFootprint = 0.004f, kSpacing = 0.00025f;
+    constexpr int kCount = 640;
+    const Shadow shadow;
+    // Lines through a border each, across the lamp's azimuth and along it.
+    for (const auto& [start, step] : {std::pair{Vec3f(-0.16f, 0, 0), Vec3f(kSpacing, 0, 0)},
+                                      std::pair{Vec3f(-0.07f, -0.12f, 0), Vec3f(0, kSpacing, 0)}}) {
+        std::vector<SurfacePoint> points;
+        for (int k = 0; k < kCount; ++k)
+            points.push_back({start + static_cast<float>(k) * step, Vec3f(0, 0, 1), kFootprint});
+        const auto lit_length_m = [&](int samples) {
+            const std::vector<float> e = shadow.column(points, samples);
+            double sum = 0.0;
+            for (const float x : e) sum += double{x} / *std::max_element(e.begin(), e.end());
+            return sum * kSpacing;
+        };
+        EXPECT_NEAR(lit_length_m(16), lit_length_m(512), 0.06 * kFootprint) << step.transpose();
+    }
+}
+
+TEST(DirectColumn, AShadowEndsWhereTheRayOverTheEdgeMeetsTheTable) {
+    Shadow shadow;
+    shadow.lamp.radius_m = 0.0;
+    constexpr float kSpacing = 0.0001f, kStart = -0.16f;
+    std::vector<SurfacePoint> points;
+    for (int k = 0; k < 600; ++k)
+        points.push_back({Vec3f(kStart + kSpacing * static_cast<float>(k), 0, 0)});
+    const std::vector<float> e = shadow.column(points, 1);
+    const auto dark = static_cast<float>(std::find(e.begin(), e.end(), 0.0f) - e.begin());
+    // Lamp at (0.5, 0.1, 0.8), upper edge of the box at x = -0.05, z = 0.1.
+    EXPECT_NEAR(kStart + kSpacing * dark, -0.05f - 0.55f / 7.0f, 0.0003f);
+}
+
 TEST(DirectColumn, OfAPointLampHasPenumbraeOfTheFootprintAlone) {
     Shadow shadow;
     shadow.lamp.radius_m = 0.0;

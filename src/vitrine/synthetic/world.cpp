@@ -271,15 +271,15 @@ Scene as_reconstructed(const World& world, const std::shared_ptr<const Mesh>& hu
     return scene;
 }
 
-/// The best lit spot of the table near the middle as frame 0 sees it, and its mean albedo there.
-ReferenceAlbedo known_albedo(const RenderScene& render, const Capture& capture) {
+/// A spot of the table near the middle that the lamps light, as frame 0 sees it, and its mean
+/// albedo there. Not the brightest: that one lies in the light that glass or metal throws.
+std::optional<ReferenceAlbedo> known_albedo(const RenderScene& render, const Capture& capture) {
     constexpr int kHalf = 2;  // the reader takes the median of 5 x 5 pixels
     constexpr int kTrials = 36;
+    constexpr double kRank = 0.7;  // of the trials, by brightness: most of the table is lit
     const RgbdFrame& frame = capture.frames[0];
     const Geometry geometry = render_geometry(render, frame.camera);
-    ReferenceAlbedo best;
-    best.frame = frame.id;
-    float brightest = 0.0f;
+    std::vector<std::pair<float, ReferenceAlbedo>> spots;  // with their irradiance, up to a factor
     for (int k = 0; k < kTrials; ++k) {
         const Vec2 pixel = frame.camera.project(on_hemisphere(0, 360.0 * k / kTrials, 0.13));
         const int u = static_cast<int>(std::round(pixel.x()));
@@ -294,13 +294,14 @@ ReferenceAlbedo known_albedo(const RenderScene& render, const Capture& capture) 
                 darkest = std::min(darkest, luminance(frame.colour.clamped(u + du, v + dv)) /
                                                 std::max(luminance(here), 0.01f));
             }
-        if (flattest < 0.99f || darkest <= brightest) continue;
+        if (flattest < 0.99f) continue;
         if (is_saturated(frame.colour.clamped(u, v), capture.saturation_level)) continue;
-        brightest = darkest;
-        best.pixel = Vec2(u, v);
-        best.albedo = albedo;
+        spots.push_back({darkest, {frame.id, Vec2(u, v), albedo}});
     }
-    return best;
+    if (spots.empty()) return std::nullopt;
+    std::sort(spots.begin(), spots.end(),
+              [](const auto& a, const auto& b) { return a.first < b.first; });
+    return spots[static_cast<std::size_t>(kRank * static_cast<double>(spots.size() - 1))].second;
 }
 
 }  // namespace
