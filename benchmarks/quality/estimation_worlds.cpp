@@ -6,10 +6,10 @@
 // resumed, and several may run side by side on files of their own. Seeds with which constants of
 // the estimators were set (docs/estimation.md) check nothing: report others.
 #include "base/log.h"
-#include "base/rng.h"
 #include "estimate/scene_estimate.h"
 #include "synthetic/world.h"
 #include "world_errors.h"
+#include "world_series.h"
 
 #include <cstdio>
 #include <ctime>
@@ -18,36 +18,6 @@
 using namespace vitrine;
 
 namespace {
-
-/// Random kinds, shapes, lights and materials; errors of geometry and poses as reconstruction
-/// leaves them (docs/results.md), noise of a good phone.
-WorldOptions world_of(std::uint64_t seed) {
-    WorldOptions options;
-    options.seed = seed;
-    Rng rng(stream_key(seed, 0xbe9cULL));
-    constexpr WorldObject kKinds[] = {WorldObject::Glass, WorldObject::Metal,  WorldObject::Glass,
-                                      WorldObject::Metal, WorldObject::Vessel, WorldObject::Glass,
-                                      WorldObject::Metal, WorldObject::Plastic};
-    options.object = kKinds[(seed / 2) % 8];
-    constexpr WorldShape kShapes[] = {WorldShape::Ball, WorldShape::Bottle, WorldShape::Torus,
-                                      WorldShape::Pebble};
-    options.shape =
-        options.object == WorldObject::Plastic ? WorldShape::Pebble : kShapes[rng.next_index(4)];
-    options.light_count = (seed / 2) % 5 == 2 ? 2 : 1;
-    options.is_sunny = (seed / 2) % 5 == 4;
-    options.width = 160;
-    options.height = 120;
-    options.samples_per_pixel = 10;
-    options.photon_count = 100'000;
-    options.sensor_noise = 0.006;
-    options.scan_error_m = 0.0008;
-    const bool is_revolution =
-        options.shape == WorldShape::Ball || options.shape == WorldShape::Bottle;
-    options.hull_error_m =
-        is_revolution || options.object == WorldObject::Vessel ? 0.00015 : 0.0003;
-    options.pose_error_m = 0.0002;
-    return options;
-}
 
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -69,7 +39,7 @@ void run_worlds(std::uint64_t first, std::uint64_t last, bool is_only_metal, boo
     for (const WorldErrors& known : read_world_errors(file)) done.insert(known.seed);
     for (std::uint64_t seed = first; seed <= last; ++seed) {
         if (done.contains(seed)) continue;
-        const WorldOptions options = world_of(seed);
+        const WorldOptions options = series_world(seed);
         if (is_only_metal && options.object != WorldObject::Metal) continue;
         const double start = cpu_seconds();
         const World world = make_world(options);

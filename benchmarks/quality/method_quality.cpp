@@ -1,7 +1,9 @@
 // Light errors of the default method, the published joint optimisation and its two baselines, on
 // captures of known truth and on worlds we make:
-//   vitrine_method_quality [--scan CACHE] [--worlds N] [--first SEED] [--light-photons N]
-//                          [--caustic-photons N] [CAPTURE...]
+//   vitrine_method_quality [--scan CACHE] [--worlds N] [--first SEED] [--ours FILE.jsonl]...
+//                          [--light-photons N] [--caustic-photons N] [CAPTURE...]
+// The worlds are those of vitrine_estimation_worlds; with --ours the default method's lights are
+// taken from the results it wrote instead of being estimated again.
 // Where metal was found, also what its highlights add to the light (estimate/joint_light.h).
 // Photons of the full emission (8 million into the half space) are timed and extrapolated.
 #include "base/timer.h"
@@ -9,8 +11,9 @@
 #include "estimate/scene_estimate.h"
 #include "math/statistics.h"
 #include "render/hemisphere_photons.h"
-#include "synthetic/world.h"
 #include "truth_scene.h"
+#include "world_errors.h"
+#include "world_series.h"
 
 #include <fmt/format.h>
 
@@ -34,6 +37,10 @@ struct Case {
 
 struct Error {
     double direction_deg = 0.0, elevation_deg = 0.0;
+};
+
+struct Cost {
+    double wall_s = 0.0, cpu_s = 0.0;
 };
 
 double elevation(const Vec3& d) { return degrees(std::asin(d.normalized().z())); }
@@ -65,9 +72,9 @@ std::vector<Vec3> positions_of(const LightEstimate& light) {
 struct Clock {
     Timer timer;
     std::clock_t start = std::clock();
-    double wall() const { return timer.seconds(); }
-    double cpu() const {
-        return static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC);
+    Cost cost() const {
+        return {timer.seconds(),
+                static_cast<double>(std::clock() - start) / static_cast<double>(CLOCKS_PER_SEC)};
     }
 };
 
@@ -75,12 +82,12 @@ struct Table {
     std::vector<std::string> order;
     std::map<std::string, std::vector<double>> direction, elevation, wall, cpu;
 
-    void add(const std::string& row, const Error& error, double wall_s, double cpu_s) {
+    void add(const std::string& row, const Error& error, const Cost& cost) {
         if (!direction.contains(row)) order.push_back(row);
         direction[row].push_back(error.direction_deg);
         elevation[row].push_back(error.elevation_deg);
-        wall[row].push_back(wall_s);
-        cpu[row].push_back(cpu_s);
+        wall[row].push_back(cost.wall_s);
+        cpu[row].push_back(cost.cpu_s);
     }
     void print(const std::string& title) const {
         fmt::print("\n{}, {} scenes\n", title, direction.at(order[0]).size());
@@ -104,41 +111,48 @@ struct Table {
     }
 };
 
-/// One scene by all methods. The paper's first step is the inverse-photon baseline: its photon maps
+/// The default method, added to the table.
+SceneEstimate measure_ours(const Case& c, Table& table) {
+    const Clock clock;
+    const SceneEstimate ours = estimate_scene(c.scene, c.capture, {});
+    table.add("default", error_of(c, positions_of(ours.light)), clock.cost());
+    table.add("best scored of the grid",
+              error_of(c, {ours.light.reference_point_m + ours.light.grid_direction}), {});
+    fmt::print("{}, default, seconds:", c.name);
+    for (const auto& [part, seconds] : ours.seconds) fmt::print(" {} {:.1f}", part, seconds);
+    fmt::print("\n");
+    return ours;
+}
+
+/// The published methods. The paper's first step is the inverse-photon baseline: its photon maps
 /// are made once.
-SceneEstimate measure(const Case& c, const PaperOptions& paper, Table& table) {
+void measure_published(const Case& c, const PaperOptions& paper, Table& table) {
     EstimateOptions options;
     options.paper = paper;
-    Clock clock;
-    const SceneEstimate ours = estimate_scene(c.scene, c.capture, options);
-    const double wall = clock.wall(), cpu = clock.cpu();
-    table.add("default", error_of(c, positions_of(ours.light)), wall, cpu);
-
     const LightOptions light = first_light_options(c.capture, options);
     const auto grid = [&](GridLightModel model, const std::string& row) {
         GridLightOptions grid_options = paper.lights;
         grid_options.model = model;
-        clock = Clock();
+        const Clock clock;
         GridLightEstimate found = estimate_grid_lights(
             c.scene, c.capture.frames, c.capture.saturation_level, light, grid_options);
-        const double w = clock.wall(), p = clock.cpu();
-        table.add(row, error_of(c, positions_of(found.light)), w, p);
+        const Cost cost = clock.cost();
+        table.add(row, error_of(c, positions_of(found.light)), cost);
         table.add(row + ", weighted mean",
-                  error_of(c, {found.light.reference_point_m + found.mean_direction}), w, p);
-        return std::pair(found, std::pair(w, p));
+                  error_of(c, {found.light.reference_point_m + found.mean_direction}), cost);
+        return std::pair(found, cost);
     };
-    const auto [local, local_time] = grid(GridLightModel::Local, "local");
-    const auto [photon, photon_time] = grid(GridLightModel::Photons, "inverse-photon");
+    const auto [local, local_cost] = grid(GridLightModel::Local, "local");
+    const auto [photon, photon_cost] = grid(GridLightModel::Photons, "inverse-photon");
 
     options.method = EstimateMethod::Paper;
     options.first_light = photon.light;
-    clock = Clock();
+    const Clock clock;
     const SceneEstimate published = estimate_scene(c.scene, c.capture, options);
-    table.add("paper", error_of(c, positions_of(published.light)), clock.wall() + photon_time.first,
-              clock.cpu() + photon_time.second);
-    table.add("nearest of the grid", error_of(c, local.positions_m), 0, 0);
-    table.add("best scored of the grid",
-              error_of(c, {ours.light.reference_point_m + ours.light.grid_direction}), 0, 0);
+    const Cost joint = clock.cost();
+    table.add("paper", error_of(c, positions_of(published.light)),
+              {joint.wall_s + photon_cost.wall_s, joint.cpu_s + photon_cost.cpu_s});
+    table.add("nearest of the grid", error_of(c, local.positions_m), {});
 
     fmt::print("{}:", c.name);
     for (const std::string& row : table.order)
@@ -147,13 +161,10 @@ SceneEstimate measure(const Case& c, const PaperOptions& paper, Table& table) {
         fmt::print("; paper: {} {} (margin {:+.2f}) n {:.3f} sigma {:.3f}", o.id,
                    class_name(o.object_class), o.class_margin, o.ior.value,
                    o.clusters.empty() ? 0.0 : o.clusters.front().fit.sigma.value);
-    fmt::print("\n  default, seconds:");
-    for (const auto& [part, seconds] : ours.seconds) fmt::print(" {} {:.1f}", part, seconds);
-    fmt::print("; paper:");
+    fmt::print("\n  paper, seconds:");
     for (const auto& [part, seconds] : published.seconds) fmt::print(" {} {:.1f}", part, seconds);
     fmt::print("\n");
     std::fflush(stdout);
-    return ours;
 }
 
 /// What highlights bring: the default's light moved by them, from the same start.
@@ -177,7 +188,7 @@ void measure_joint(const Case& c, const SceneEstimate& ours, Table& table) {
             refine_light_jointly(c.scene, c.capture.frames, c.capture.saturation_level, ours.light,
                                  ours.objects, light, {}, options, &report);
         const Error error = error_of(c, positions_of(moved));
-        table.add(row, error, clock.wall(), clock.cpu());
+        table.add(row, error, clock.cost());
         fmt::print(" {} {:.2f} deg (object cost {:.4f} to {:.4f})", row, error.direction_deg,
                    report.object_cost_before, report.object_cost_after);
     }
@@ -194,7 +205,7 @@ void time_full_emission(const Case& c) {
     const Clock clock;
     const std::size_t hits =
         trace_hemisphere_photons(world, c.lights[0].position_m, c.lights[0].normal, options).size();
-    const double seconds = clock.cpu();
+    const double seconds = clock.cost().cpu_s;
     fmt::print(
         "full emission: {} photons, {} hits in {:.2f} processor seconds; 8 million for 9 "
         "places and 81 indices: {:.1f} hours (extrapolated)\n",
@@ -214,10 +225,7 @@ Case read_case(const std::filesystem::path& folder, const std::filesystem::path&
 }
 
 Case make_case(std::uint64_t seed) {
-    WorldOptions options;
-    options.seed = seed;
-    options.object = seed % 2 == 0 ? WorldObject::Glass : WorldObject::Metal;
-    World world = make_world(options);
+    World world = make_world(series_world(seed));
     return {world.capture.name, std::move(world.labelled), std::move(world.capture), world.lights,
             Vec3::Zero()};
 }
@@ -228,6 +236,7 @@ int main(int argc, char** argv) {
     std::filesystem::path cache;
     PaperOptions paper;
     std::uint64_t worlds = 0, first = 1000;
+    std::map<std::uint64_t, WorldErrors> ours;
     std::vector<std::filesystem::path> folders;
     for (int i = 1; i < argc; ++i) {
         const std::string word = argv[i];
@@ -238,6 +247,9 @@ int main(int argc, char** argv) {
             worlds = static_cast<std::uint64_t>(number());
         } else if (word == "--first") {
             first = static_cast<std::uint64_t>(number());
+        } else if (word == "--ours") {
+            for (WorldErrors& known : read_world_errors(argv[++i]))
+                ours.insert_or_assign(known.seed, std::move(known));
         } else if (word == "--light-photons") {
             paper.lights.photon_count = static_cast<int>(number());
         } else if (word == "--caustic-photons") {
@@ -250,11 +262,20 @@ int main(int argc, char** argv) {
     for (const std::filesystem::path& folder : folders) {
         const Case c = read_case(folder, cache);
         if (captures.order.empty()) time_full_emission(c);
-        measure_joint(c, measure(c, paper, captures), joint);
+        const SceneEstimate estimate = measure_ours(c, captures);
+        measure_published(c, paper, captures);
+        measure_joint(c, estimate, joint);
     }
-    for (std::uint64_t k = 0; k < worlds; ++k) {
-        const Case c = make_case(first + k);
-        measure_joint(c, measure(c, paper, made), joint);
+    for (std::uint64_t seed = first; seed < first + worlds; ++seed) {
+        const Case c = make_case(seed);
+        if (const auto known = ours.find(seed); known != ours.end()) {
+            const WorldErrors& e = known->second;
+            made.add("default", {e.light_direction_deg, e.light_elevation_deg},
+                     {0.0, e.estimate_cpu_seconds});
+        } else {
+            measure_joint(c, measure_ours(c, made), joint);
+        }
+        measure_published(c, paper, made);
     }
     if (!captures.order.empty())
         captures.print(cache.empty() ? "Captures, true geometry" : "Captures, reconstructed");

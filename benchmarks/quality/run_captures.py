@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Runs the whole chain on captures of known truth and prints one table of errors (Markdown).
 
-Usage: benchmarks/quality/run_captures.py [--out DIR] [--program VITRINE] [--lambertian] CAPTURE ...
+Usage: benchmarks/quality/run_captures.py [--out DIR] [--program VITRINE] [--quality preview|final]
+                                          [--lambertian] CAPTURE ...
 Each CAPTURE is a capture folder with truth/scene.json. With --lambertian the baseline is run as well:
 the same scan, meshes and light with every object forced to diffuse. Results are kept in DIR; a second
 call re-uses finished stages.
@@ -68,19 +69,21 @@ def main():
     parser.add_argument("captures", nargs="+", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/captures"))
     parser.add_argument("--program", default="build/release/bin/vitrine")
+    parser.add_argument("--quality", choices=["preview", "final"], default="final")
     parser.add_argument("--lambertian", action="store_true")
     options = parser.parse_args()
     columns = []
     for capture in options.captures:
         folder = options.out / capture.name
-        columns.append((capture.name, run(options.program, capture, folder, [])))
+        extra = ["--quality", options.quality]
+        columns.append((capture.name, run(options.program, capture, folder, extra)))
         if options.lambertian:
             # The baseline shares scan, candidates and light: copy them, so that they are re-used.
             baseline = options.out / (capture.name + "_lambertian")
             if not baseline.exists():
                 shutil.copytree(folder, baseline)
             columns.append((capture.name + ", Lambertian",
-                            run(options.program, capture, baseline, ["--lambertian"])))
+                            run(options.program, capture, baseline, [*extra, "--lambertian"])))
     print("| error of | " + " | ".join(name for name, _ in columns) + " |")
     print("|---|" + "---|" * len(columns))
     for title, subject, quantity, form in ROWS:

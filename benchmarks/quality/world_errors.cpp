@@ -4,6 +4,7 @@
 #include "estimate/object_pixels.h"
 #include "optics/ward.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -173,6 +174,24 @@ WorldErrors compare(const WorldOptions& options, const World& world,
         errors.grid_error_deg = std::min(
             errors.grid_error_deg,
             degrees(angle_between(light.position_m - reference, estimate.light.grid_direction)));
+    const auto elevation = [&](const Vec3& d) {
+        return degrees(
+            std::asin(std::clamp(d.normalized().dot(estimate.light.plane.normal), -1.0, 1.0)));
+    };
+    for (const DiscLight& light : world.lights) {
+        const Vec3 is = light.position_m - reference;
+        double angle = 180.0, elevation_error = 90.0;
+        for (const FittedLight& fitted : estimate.light.lights) {
+            const Vec3 found = fitted.light.position_m - reference;
+            const double a = degrees(angle_between(is, found));
+            if (a >= angle) continue;
+            angle = a;
+            elevation_error = std::abs(elevation(found) - elevation(is));
+        }
+        const auto share = 1.0 / static_cast<double>(world.lights.size());
+        errors.light_direction_deg += share * angle;
+        errors.light_elevation_deg += share * elevation_error;
+    }
     // Strongest first; each true light takes the nearest found one that is left.
     std::vector<char> taken(estimate.light.lights.size(), 0);
     for (std::size_t k = 0; k < world.lights.size(); ++k) {
@@ -212,6 +231,8 @@ std::vector<WorldErrors> read_world_errors(const std::filesystem::path& file) {
         errors.true_lights = j["true_lights"];
         errors.found_lights = j["found_lights"];
         errors.grid_error_deg = j["grid_error_deg"];
+        errors.light_direction_deg = j["light_direction_deg"];
+        errors.light_elevation_deg = j["light_elevation_deg"];
         for (const Json& q : j["quantities"])
             errors.quantities.push_back({q["name"], q["error"], q["stddev"], q["outcome"]});
         all.push_back(std::move(errors));
@@ -229,6 +250,8 @@ void append_world_errors(const std::filesystem::path& file, const WorldErrors& e
               {"true_lights", errors.true_lights},
               {"found_lights", errors.found_lights},
               {"grid_error_deg", errors.grid_error_deg},
+              {"light_direction_deg", errors.light_direction_deg},
+              {"light_elevation_deg", errors.light_elevation_deg},
               {"quantities", Json::array()}};
     for (const QuantityError& q : errors.quantities)
         j["quantities"].push_back(

@@ -25,6 +25,9 @@ struct WorldErrors {
     std::string true_class, found_class;
     int true_lights = 1, found_lights = 1;
     double grid_error_deg = 0.0;  ///< of the best of the 36 grid lights
+    /// Mean over the true lights of the nearest one found: whole angle, and elevation alone (the
+    /// paper's metric).
+    double light_direction_deg = 0.0, light_elevation_deg = 0.0;
     std::vector<QuantityError> quantities;
 };
 

@@ -169,19 +169,37 @@ LightScore LightFit::score_at(const LightColumns& columns, int stride, int chann
     return result;
 }
 
-LightScore LightFit::score(const LightColumns& columns, int stride, int channel) const {
+double LightFit::max_ambient_ratio(const LightColumns& columns, int stride) const {
     std::vector<float> sorted(columns.clear.begin(),
                               columns.clear.begin() + static_cast<long>(count(stride)));
     const std::size_t k = 9 * sorted.size() / 10;
     std::nth_element(sorted.begin(), sorted.begin() + static_cast<long>(k), sorted.end());
-    if (sorted[k] <= 0.0f) return {};
+    return sorted[k] > 0.0f ? kMaxAmbientShare * sorted[k] / kPi : 0.0;
+}
+
+LightScore LightFit::score(const LightColumns& columns, int stride, int channel) const {
+    const double limit = max_ambient_ratio(columns, stride);
+    if (limit <= 0.0) return {};
     // b enters as a square: fine steps near zero, where it most often is.
-    const double limit = std::sqrt(kMaxAmbientShare * sorted[k] / kPi);
-    const Minimum1d best = minimise_golden(
-        [&](double t) { return score_at(columns, stride, channel, t * t).cost; }, 0.0, limit, 9);
+    const Minimum1d best =
+        minimise_golden([&](double t) { return score_at(columns, stride, channel, t * t).cost; },
+                        0.0, std::sqrt(limit), 9);
     LightScore with = score_at(columns, stride, channel, best.x * best.x);
     LightScore without = score_at(columns, stride, channel, 0.0);
     return without.cost <= with.cost ? without : with;
+}
+
+LightScore LightFit::score_near(const LightColumns& columns, int stride, int channel,
+                                double b) const {
+    constexpr double kFactor = 3.0;
+    constexpr double kLeastShare = 0.03;  // of the greatest ratio: none at all in luminance
+    const double limit = max_ambient_ratio(columns, stride);
+    const Minimum1d best = minimise_golden(
+        [&](double t) { return score_at(columns, stride, channel, t * t).cost; },
+        std::sqrt(b / kFactor), std::sqrt(std::min(limit, kFactor * b + kLeastShare * limit)), 9);
+    LightScore with = score_at(columns, stride, channel, best.x * best.x);
+    LightScore as_luminance = score_at(columns, stride, channel, b);
+    return as_luminance.cost <= with.cost ? as_luminance : with;
 }
 
 void LightFit::losses(const LightColumns& columns, int stride, int channel, const LightScore& score,

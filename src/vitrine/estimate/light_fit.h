@@ -52,6 +52,10 @@ class LightFit {
 
     /// Projects albedos out, searches b, fixes I. @param channel 0..2 or kLuminance
     LightScore score(const LightColumns& columns, int stride, int channel) const;
+    /// One channel of a light whose luminance has the ambient ratio `b`: its own lies within a
+    /// factor of three. A colour of the light decides more than that; a wrong minimum elsewhere may
+    /// not.
+    LightScore score_near(const LightColumns& columns, int stride, int channel, double b) const;
     /// The same with b given.
     LightScore score_at(const LightColumns& columns, int stride, int channel,
                         double ambient_ratio) const;
@@ -64,6 +68,7 @@ class LightFit {
     bool has_reference() const { return reference_.has_value(); }
 
   private:
+    double max_ambient_ratio(const LightColumns& columns, int stride) const;
     double irradiance(const LightColumns& columns, std::size_t row, std::size_t sample, int channel,
                       double b, double g) const;
 

@@ -36,12 +36,13 @@ void fit_channels(const LightFit& fit, const LightSet& set, LightEstimate& estim
         if (!share.empty()) {
             const MinimumNd best = minimise_nelder_mead(
                 [&](const std::vector<double>& x) {
-                    return fit.score(combined(x), 1, channel).cost;
+                    return fit.score_near(combined(x), 1, channel, set.score.ambient_ratio).cost;
                 },
                 share, std::vector<double>(share.size(), 0.1), {.max_evaluations = 40});
             share = best.x;
         }
-        const LightScore score = fit.score(combined(share), 1, channel);
+        const LightScore score =
+            fit.score_near(combined(share), 1, channel, set.score.ambient_ratio);
         for (std::size_t k = 0; k < columns.size(); ++k)
             estimate.lights[k].light.intensity_w_per_sr[channel] = static_cast<float>(
                 score.intensity * set.lights[k].weight * (k == 0 ? 1.0 : std::exp(share[k - 1])));

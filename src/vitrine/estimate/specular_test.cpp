@@ -185,6 +185,24 @@ TEST_F(SpecularTest, TwoPaintsShareWhatOneCannotTell) {
     EXPECT_EQ(fit_ward_clusters(world, pixels_, light_, 0.3, options_).clusters.size(), 1u);
 }
 
+TEST_F(SpecularTest, TheDoubtOfTheLightGoesOnIntoTheReflectances) {
+    const Ward truth = bronze(0.12, 0.12);
+    shade(truth, 0.01f);
+    const WardFit sure = fit();
+    constexpr double kDoubt = 0.2;
+    light_.stddev_irradiance_ratio = kDoubt;
+    for (DiscLight& lamp : light_.lights) lamp.intensity_w_per_sr *= static_cast<float>(1 - kDoubt);
+    const WardFit doubtful = fit();  // of a light taken for too dim by one deviation
+    for (int c = 0; c < 3; ++c) {
+        const double error = doubtful.ward.rho_d[c] - truth.rho_d[c];
+        EXPECT_GT(error, 2.0 * sure.stddev_rho_d[c]) << c;
+        EXPECT_LT(error, 2.0 * doubtful.stddev_rho_d[c]) << c;
+        EXPECT_GT(doubtful.stddev_rho_d[c], kDoubt * doubtful.ward.rho_d[c]) << c;
+        EXPECT_GT(doubtful.stddev_rho_s[c], kDoubt * doubtful.ward.rho_s[c]) << c;
+    }
+    EXPECT_NEAR(doubtful.sigma.stddev, sure.sigma.stddev, 0.3 * sure.sigma.stddev);
+}
+
 TEST_F(SpecularTest, PaintHasNoLobe) {
     Ward paint = bronze(0.1, 0.1);
     paint.rho_s.setZero();
