@@ -27,8 +27,8 @@ constexpr double kModelLogRadius = 0.15;
 
 // Index: grows with the residual, which is large where the hull is off.
 constexpr double kModelIorPerCost = 0.25;
-constexpr double kModelAbsorption = 0.30;  // per metre: gain errors of 2 % over 7 cm
-constexpr double kModelAbsorptionRatio = 0.05;
+constexpr double kModelAbsorption = 0.05;  // per metre
+constexpr double kModelAbsorptionRatio = 0.015;
 
 // Ward: relative; a hull's normals move light between lobe and diffuse.
 constexpr double kModelLogSigma = 0.04;

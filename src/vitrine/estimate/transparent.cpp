@@ -24,6 +24,7 @@ constexpr int kBootstrapRounds = 40;
 constexpr double kMinCostContrast = 1.15;
 constexpr double kMinCostSpread = 0.02;
 constexpr double kMinExplained = 0.15;
+constexpr int kRays = 2;  // side of the square of rays in a pixel
 
 Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& direction,
                 const Rgb& ambient) {
@@ -32,6 +33,41 @@ Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& 
     return seen ? *seen : ambient;
 }
 
+/// One ray of a pixel.
+template <typename Trace, typename TraceInner>
+ThroughPixel predict_ray(const EstimationScene& scene, const FrameLookup& lookup, const Vec3f& eye,
+                         const Vec3f& direction, const Rgb& ambient, const Trace& trace,
+                         const TraceInner& trace_inner) {
+    ThroughPixel result;
+    const RefractedPath path = trace(eye, direction);
+    if (!path.is_valid) return result;
+    const Hit hit = scan_behind(scene, path, scene.offset_m());
+    Rgb background = ambient;
+    if (hit.is_hit()) {
+        if (hit.normal.dot(path.exit_direction) >= 0.0f) return result;
+        const Mesh& mesh = scene.mesh(hit.part);
+        const std::optional<Rgb> seen =
+            lookup.background({hit_point(mesh, hit), shading_normal(mesh, hit)}, -1);
+        if (!seen) return result;
+        background = *seen;
+    }
+    const RefractedPath inner = trace_inner(eye, direction);
+    if (inner.is_valid) {
+        result.inner =
+            inner.transmittance * environment(scene, inner.exit, inner.exit_direction, ambient);
+        result.inner_length_m = inner.length_m;
+    }
+    result.transmitted = path.transmittance * background;
+    result.reflected =
+        path.entry_reflectance *
+        environment(scene, path.entry, reflect(-direction, path.entry_normal), ambient);
+    result.length_m = path.length_m;
+    result.is_valid = true;
+    return result;
+}
+
+/// Mean over a square of rays in every pixel: glass turns a pixel into a wide patch of what lies
+/// behind, or a small one.
 template <typename Trace, typename TraceInner>
 std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLookup& lookup,
                                   const std::vector<ObjectPixel>& pixels, const Rgb& ambient,
@@ -39,30 +75,32 @@ std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLooku
     std::vector<ThroughPixel> result(pixels.size());
     parallel_for(pixels.size(), 16, [&](std::size_t i) {
         const ObjectPixel& pixel = pixels[i];
-        const RefractedPath path = trace(pixel);
-        if (!path.is_valid) return;
-        const Hit hit = scan_behind(scene, path, scene.offset_m());
-        Rgb background = ambient;
-        if (hit.is_hit()) {
-            if (hit.normal.dot(path.exit_direction) >= 0.0f) return;
-            const Mesh& mesh = scene.mesh(hit.part);
-            const std::optional<Rgb> seen =
-                lookup.background({hit_point(mesh, hit), shading_normal(mesh, hit)}, -1);
-            if (!seen) return;
-            background = *seen;
+        const Camera& camera = lookup.cameras()[static_cast<std::size_t>(pixel.frame)];
+        ThroughPixel sum;
+        int valid = 0;
+        for (int k = 0; k < kRays * kRays; ++k) {
+            const double du = (k % kRays + 0.5) / kRays - 0.5;
+            const double dv = (k / kRays + 0.5) / kRays - 0.5;
+            const Vec3f direction = camera.ray_in_world(pixel.u + du, pixel.v + dv).cast<float>();
+            const ThroughPixel ray =
+                predict_ray(scene, lookup, pixel.eye, direction, ambient, trace, trace_inner);
+            if (!ray.is_valid) continue;
+            ++valid;
+            sum.transmitted += ray.transmitted;
+            sum.reflected += ray.reflected;
+            sum.inner += ray.inner;
+            sum.length_m += ray.length_m;
+            sum.inner_length_m += ray.inner_length_m;
         }
-        const Vec3f mirrored = reflect(-pixel.direction, path.entry_normal);
-        const RefractedPath inner = trace_inner(pixel);
-        if (inner.is_valid) {
-            result[i].inner =
-                inner.transmittance * environment(scene, inner.exit, inner.exit_direction, ambient);
-            result[i].inner_length_m = inner.length_m;
-        }
-        result[i].transmitted = path.transmittance * background;
-        result[i].reflected =
-            path.entry_reflectance * environment(scene, path.entry, mirrored, ambient);
-        result[i].length_m = path.length_m;
-        result[i].is_valid = true;
+        if (2 * valid <= kRays * kRays) return;
+        const float share = 1.0f / static_cast<float>(valid);
+        sum.transmitted *= share;
+        sum.reflected *= share;
+        sum.inner *= share;
+        sum.length_m *= share;
+        sum.inner_length_m *= share;
+        sum.is_valid = true;
+        result[i] = sum;
     });
     return result;
 }
@@ -143,11 +181,11 @@ std::vector<ThroughPixel> look_through(const EstimationScene& scene, const Frame
                                        double ior, const Rgb& ambient) {
     return predict(
         scene, lookup, pixels, ambient,
-        [&](const ObjectPixel& p) {
-            return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior));
+        [&](const Vec3f& eye, const Vec3f& direction) {
+            return refract_through(scene, object, eye, direction, static_cast<float>(ior));
         },
-        [&](const ObjectPixel& p) {
-            return refract_through(scene, object, p.eye, p.direction, static_cast<float>(ior), 1);
+        [&](const Vec3f& eye, const Vec3f& direction) {
+            return refract_through(scene, object, eye, direction, static_cast<float>(ior), 1);
         });
 }
 
@@ -158,10 +196,10 @@ std::vector<ThroughPixel> look_through_vessel(const EstimationScene& scene,
     const Vessel vessel(scene.mesh(scene.part_of_object(object)), wall_m);
     return predict(
         scene, lookup, pixels, ambient,
-        [&](const ObjectPixel& p) {
-            return vessel.pass(p.eye, p.direction, static_cast<float>(ior));
+        [&](const Vec3f& eye, const Vec3f& direction) {
+            return vessel.pass(eye, direction, static_cast<float>(ior));
         },
-        [](const ObjectPixel&) { return RefractedPath{}; });
+        [](const Vec3f&, const Vec3f&) { return RefractedPath{}; });
 }
 
 TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup, int object,

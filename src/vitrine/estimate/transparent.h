@@ -49,7 +49,7 @@ struct TransparentFit {
     Estimate<double> wall_m;  ///< of a shell
 };
 
-/// Predicts all pixels for a solid of index `ior`.
+/// Predicts all pixels for a solid of index `ior`: the mean over four rays in each.
 std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
                                        int object, const std::vector<ObjectPixel>& pixels,
                                        double ior, const Rgb& ambient);

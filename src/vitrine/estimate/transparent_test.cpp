@@ -2,6 +2,7 @@
 
 #include "estimate/object_pixels.h"
 #include "geometry/primitives.h"
+#include "render/estimation_refraction.h"
 
 #include <gtest/gtest.h>
 
@@ -111,6 +112,26 @@ TEST(FitSolid, AnswersOnTheGridAskedFor) {
     options.ior_step = 0.02;
     const TransparentFit fit = Ball(1.463, Rgb::Zero(), 1.0f).fit(options);
     EXPECT_NEAR(fit.ior.value, 1.46, 1e-9);
+}
+
+TEST(RefractThrough, PassesABodyThatIsMetAgain) {
+    constexpr double kRadius = 0.02;
+    Mesh pair = make_sphere(kRadius, Vec3(-0.03, 0, 0), 96);
+    append(pair, make_sphere(kRadius, Vec3(0.03, 0, 0), 96));
+    Scene scene;
+    Part table, object;
+    table.name = "scan";
+    table.mesh = std::make_shared<const Mesh>(make_plane(1.0, -0.1, 2));
+    object.name = "object_0";
+    object.mesh = std::make_shared<const Mesh>(std::move(pair));
+    scene.parts = {table, object};
+    const EstimationScene world(scene);
+    const Vec3f eye(-0.4f, 1e-4f, 1e-4f), ahead(1, 0, 0);
+    const RefractedPath path = refract_through(world, 0, eye, ahead, 1.5f);
+    ASSERT_TRUE(path.is_valid);
+    EXPECT_GT(path.exit.x(), 0.045f);
+    EXPECT_NEAR(path.length_m, 4.0 * kRadius, 1e-3);
+    EXPECT_NEAR(path.transmittance, std::pow(0.96, 4), 1e-3);
 }
 
 }  // namespace

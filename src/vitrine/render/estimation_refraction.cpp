@@ -9,14 +9,14 @@ namespace vitrine {
 
 namespace {
 constexpr float kLeave = 2e-5f;  // metres off a smooth hull: well above float noise at one metre
-}
+constexpr int kMaxPasses = 3;    // a ring is crossed twice; more ways carry little light
 
-ObjectEntry enter_object(const EstimationScene& scene, int object, const Vec3f& origin,
-                         const Vec3f& direction) {
+/// `hit` as an entry when it is on the object.
+ObjectEntry entry_at(const EstimationScene& scene, int object, const Hit& hit,
+                     const Vec3f& direction) {
     ObjectEntry entry;
-    const Mesh& mesh = scene.mesh(scene.part_of_object(object));
-    const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, object_mask(object)});
-    if (!hit.is_hit()) return entry;
+    if (!hit.is_hit() || hit.part != scene.part_of_object(object)) return entry;
+    const Mesh& mesh = scene.mesh(hit.part);
     entry.is_hit = true;
     entry.point = hit_point(mesh, hit);
     entry.normal = shading_normal(mesh, hit);
@@ -24,29 +24,33 @@ ObjectEntry enter_object(const EstimationScene& scene, int object, const Vec3f& 
     entry.is_valid = hit.normal.dot(direction) < 0.0f && entry.normal.dot(direction) < 0.0f;
     return entry;
 }
+}  // namespace
 
-RefractedPath refract_from(const EstimationScene& scene, int object, const ObjectEntry& entry,
-                           float ior, int skipped_exits) {
-    RefractedPath path;
-    path.entry = entry.point;
-    path.entry_normal = entry.normal;
-    if (!entry.is_valid) return path;
+ObjectEntry enter_object(const EstimationScene& scene, int object, const Vec3f& origin,
+                         const Vec3f& direction) {
+    const Hit hit = scene.accel().closest({origin, direction, 0.0f, 1e30f, object_mask(object)});
+    return entry_at(scene, object, hit, direction);
+}
+
+namespace {
+
+/// Adds one way through the body, from outside at `entry` until it is let out, to `path`; false
+/// when it never is, or leaks out of a rough mesh.
+bool pass_body(const EstimationScene& scene, int object, const ObjectEntry& entry, float ior,
+               int& skipped_exits, RefractedPath& path) {
     const Mesh& mesh = scene.mesh(scene.part_of_object(object));
     const std::uint32_t mask = object_mask(object);
-    Vec3f normal = entry.normal;
-    const Vec3f& direction = entry.direction;
-
     float cos_t = 0.0f;
-    path.entry_reflectance = fresnel_dielectric(-normal.dot(direction), ior, cos_t);
-    path.transmittance = 1.0f - path.entry_reflectance;
-    Vec3f inside = refract(-direction, normal, ior, cos_t).normalized();
-    Vec3f at = path.entry;
+    const float reflected = fresnel_dielectric(-entry.normal.dot(entry.direction), ior, cos_t);
+    path.transmittance *= 1.0f - reflected;
+    Vec3f inside = refract(-entry.direction, entry.normal, ior, cos_t).normalized();
+    Vec3f at = entry.point;
     for (int bounce = 0; bounce <= kMaxInternalReflections; ++bounce) {
         const Hit hit = scene.accel().closest({at, inside, kLeave, 1e30f, mask});
-        if (!hit.is_hit() || hit.normal.dot(inside) <= 0.0f) return path;  // leak of a rough mesh
-        normal = shading_normal(mesh, hit);
+        if (!hit.is_hit() || hit.normal.dot(inside) <= 0.0f) return false;
+        const Vec3f normal = shading_normal(mesh, hit);
         const float cos_i = normal.dot(inside);
-        if (cos_i <= 0.0f) return path;
+        if (cos_i <= 0.0f) return false;
         at = hit_point(mesh, hit);
         path.length_m += hit.distance;
         const float reflectance = fresnel_dielectric(std::min(cos_i, 1.0f), 1.0f / ior, cos_t);
@@ -57,12 +61,41 @@ RefractedPath refract_from(const EstimationScene& scene, int object, const Objec
             path.transmittance *= 1.0f - reflectance;
             path.exit = at;
             path.exit_direction = refract(-inside, Vec3f(-normal), 1.0f / ior, cos_t).normalized();
-            path.internal_reflections = bounce;
-            path.is_valid = true;
-            return path;
+            path.internal_reflections += bounce;
+            return true;
         }
         inside = (inside - 2.0f * cos_i * normal).normalized();
     }
+    return false;
+}
+
+/// Where a ray that left the body meets it again before the scan, as at a ring's far side.
+ObjectEntry meet_again(const EstimationScene& scene, int object, const RefractedPath& path) {
+    const Accel& accel = scene.accel();
+    const std::uint32_t mask = object_mask(object);
+    ObjectEntry entry;
+    if (!accel.is_occluded({path.exit, path.exit_direction, kLeave, 1e30f, mask})) return entry;
+    const Hit hit =
+        accel.closest({path.exit, path.exit_direction, kLeave, 1e30f, mask | kScanMask});
+    return entry_at(scene, object, hit, path.exit_direction);
+}
+
+}  // namespace
+
+RefractedPath refract_from(const EstimationScene& scene, int object, const ObjectEntry& entry,
+                           float ior, int skipped_exits) {
+    RefractedPath path;
+    path.entry = entry.point;
+    path.entry_normal = entry.normal;
+    if (!entry.is_valid) return path;
+    path.entry_reflectance = fresnel_dielectric(-entry.normal.dot(entry.direction), ior);
+    path.transmittance = 1.0f;
+    ObjectEntry next = entry;
+    for (int pass = 0; pass < kMaxPasses && next.is_valid; ++pass) {
+        if (!pass_body(scene, object, next, ior, skipped_exits, path)) return path;
+        next = meet_again(scene, object, path);
+    }
+    path.is_valid = true;
     return path;
 }
 

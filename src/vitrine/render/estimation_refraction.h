@@ -7,9 +7,10 @@ namespace vitrine {
 
 /// One way of a ray through a solid dielectric: refracted in, totally reflected as often as Snell
 /// asks, refracted out; or the weaker way that is first reflected inside where it could have left.
+/// A body met again before the scan, as a ring's far side, is passed again.
 struct RefractedPath {
-    bool is_valid = false;  ///< entered and left again
-    Vec3f entry = Vec3f::Zero();
+    bool is_valid = false;        ///< entered and left again
+    Vec3f entry = Vec3f::Zero();  ///< the first
     Vec3f entry_normal = Vec3f::Zero();
     float entry_reflectance = 0.0f;
     Vec3f exit = Vec3f::Zero();
