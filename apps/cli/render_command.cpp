@@ -10,13 +10,10 @@
 namespace vitrine::cli {
 namespace {
 
-/// Enough for the mean over neighbours to look smooth.
-constexpr double kSoftSamples = 8;
-
 struct RenderArguments {
     std::string scene, out, camera, method = "photons";
     double resolution = 1.0, white = 1.0;
-    FinalOptions options;
+    FinalOptions options = picture_options();
 };
 
 void declare(CLI::App& command, RenderArguments& a) {
@@ -37,7 +34,9 @@ void declare(CLI::App& command, RenderArguments& a) {
     command.add_option("--method", a.method, "photons, or paths: the slow reference")
         ->check(CLI::IsMember({"photons", "paths"}))
         ->group("Quality");
-    command.add_option("--samples-per-pixel", a.options.samples_per_pixel, "Paths per pixel")
+    command
+        .add_option("--samples-per-pixel", a.options.samples_per_pixel,
+                    "Paths per pixel, everywhere")
         ->check(CLI::Range(1, 1 << 20))
         ->group("Quality");
     command
@@ -77,8 +76,6 @@ void declare(CLI::App& command, RenderArguments& a) {
 void add_render_command(CLI::App& root) {
     CLI::App* command = root.add_subcommand("render", "Render a scene file");
     auto a = std::make_shared<RenderArguments>();
-    a->options.caustics.gather_radius_m = 0.0;
-    a->options.soft_samples_per_pixel = kSoftSamples;
     declare(*command, *a);
     const auto common = add_common_options(*command);
     on_run(*command, common, [=] {

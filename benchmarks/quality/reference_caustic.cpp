@@ -21,7 +21,7 @@ struct Options {
     std::vector<int> cameras = {0, 1, 2, 3};
     std::vector<std::uint64_t> photon_counts = {20'000'000};
     int sphere_rings = 96;
-    FinalOptions render;
+    FinalOptions render = picture_options();
 };
 
 /// The reference leaves out light that the caustic scatters on, which weighs below this radiance.
@@ -112,6 +112,36 @@ void print_bins(const ImageRgb& image, const ImageRgb& reference, const Mask& re
     std::printf("\n");
 }
 
+/// The pixel that weighs most in the relative error of the region.
+void print_worst(const ImageRgb& image, const ImageRgb& reference, const Mask& region) {
+    Mask rest = region;
+    double mean = 0;
+    const auto is_used = [&](std::size_t i) {
+        return rest[i] > 127 && reference[i][1] >= kDarkest;
+    };
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        if (is_used(i)) mean += reference[i].mean();
+    }
+    mean /= std::max(1.0, static_cast<double>(count_inside(region)));
+    std::size_t worst = 0;
+    double most = -1;
+    for (std::size_t i = 0; i < rest.size(); ++i) {
+        if (!is_used(i)) continue;
+        const double b = reference[i].mean(), d = image[i].mean() - b;
+        const double error = d * d / (b * b + 0.01 * mean * mean);
+        if (error <= most) continue;
+        most = error;
+        worst = i;
+    }
+    if (most < 0) return;
+    rest[worst] = 0;
+    const auto width = static_cast<std::size_t>(image.width());
+    std::printf("  worst pixel (%zu, %zu): %.4f, reference %.4f; D without it relMSE %.5f\n",
+                worst % width, worst / width, double(image[worst].mean()),
+                double(reference[worst].mean()),
+                compare(image, reference, rest, kDarkest).relative);
+}
+
 /// A pixel of the open table: our picture, direct light alone in closed form (what the other
 /// renderers were checked with), the reference with its interreflection's noise.
 void print_check_pixel(const ImageRgb& image, const ImageRgb& reference, const Scene& scene,
@@ -160,7 +190,10 @@ void measure(const Options& options, int number, std::uint64_t photon_count) {
         number, static_cast<unsigned long long>(photon_count), render.samples_per_pixel, d.relative,
         d.normalised, core.energy, s.relative, s.energy, seconds);
     if (number == 0) print_check_pixel(image, truth, reference.scene, camera, 150, 250);
-    if (number >= 2) print_bins(image, truth, regions.table);
+    if (number >= 2) {
+        print_bins(image, truth, regions.table);
+        print_worst(image, truth, regions.table);
+    }
     if (number == 2) print_check_pixel(image, truth, reference.scene, camera, 100, 300);
     std::fflush(stdout);
     if (options.out.empty()) return;
@@ -172,7 +205,6 @@ void measure(const Options& options, int number, std::uint64_t photon_count) {
 
 int run(int argc, char** argv) {
     Options options;
-    options.render.caustics.gather_radius_m = 0;
     CLI::App app("Compare our render of the canonical caustic with its converged pictures");
     app.add_option("folder", options.folder, "Folder with ground_truth.json and the pictures")
         ->required();

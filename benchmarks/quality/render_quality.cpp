@@ -6,7 +6,8 @@
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
-#include "render_truth.h"
+#include "math/statistics.h"
+#include "plain_quality.h"
 
 #include <CLI/CLI.hpp>
 
@@ -16,19 +17,12 @@ namespace vitrine {
 namespace {
 namespace fs = std::filesystem;
 
-struct Options {
-    std::string capture;
-    std::string insert = "insert";
-    std::string out;
-    int samples = 64;
-    double crease_deg = kCreaseDeg;
-    bool has_second_seed = false;
-    DifferentialOptions differential;
-};
-
 Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
 
 constexpr double kBlurPx = 2.0;
+
+/// Of the picture's mean.
+constexpr double kFirefly = 0.1;
 
 /// Clipped as the camera does, then with - without.
 ImageRgb raw_difference(const ImageRgb& with, const ImageRgb& without, float top) {
@@ -93,105 +87,43 @@ double noise_rms(const ImageRgb& truth, const ImageRgb& estimate, double level) 
     return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
 }
 
-void write_triptych(const fs::path& path, const std::vector<ImageRgb>& images, double scale) {
-    int width = 0;
-    for (const ImageRgb& image : images) width += image.width();
-    ImageRgb all(width, images.front().height());
-    int x0 = 0;
-    for (const ImageRgb& image : images) {
-        for (int y = 0; y < image.height(); ++y) {
-            for (int x = 0; x < image.width(); ++x) all(x0 + x, y) = image(x, y);
-        }
-        x0 += image.width();
-    }
-    write_composite_png(path, all, scale);
-}
-
-Mask all_special(const fs::path& folder, const std::string& frame, const Camera& camera) {
-    Mask mask(camera.width, camera.height);
-    if (!fs::exists(folder / "mask")) return mask;
-    for (const auto& entry : fs::directory_iterator(folder / "mask")) {
-        if (entry.path().filename().string().starts_with(frame)) {
-            mask = mask_or(mask, read_mask(entry.path()));
-        }
-    }
-    return mask;
-}
-
-void compare_plain(const Options& options, const TruthScene& truth, const RenderScene& scene,
-                   const CausticMaps& maps) {
-    const fs::path folder = fs::path(options.capture) / "truth";
-    for (const Camera& camera : truth.scene.cameras) {
-        const fs::path file = folder / "linear" / (camera.id + ".exr");
-        if (!fs::exists(file)) continue;
-        const ImageRgb reference = read_exr_rgb(file);
-        FinalOptions final_options;
-        final_options.samples_per_pixel = options.samples;
-        Timer timer;
-        const RenderedImage image = render_image(scene, camera, &maps, final_options);
-        const double seconds = timer.seconds();
-        const Mask special = dilate(all_special(folder, camera.id, camera), 4);
-        const double level = truth.direct_level / kPi;  // of a white surface
-        double sum = 0, bias = 0;
-        std::size_t count = 0;
-        double flux = 0, flux_true = 0, sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0;
-        std::size_t bright = 0;
-        const Geometry geometry = render_geometry(scene, camera);
-        for (std::size_t i = 0; i < reference.size(); ++i) {
-            if (special[i] > 127) continue;
-            const double albedo = std::max(0.02f, geometry.albedo[i][1]);
-            const double a = image.radiance[i][1], b = reference[i][1];
-            const double direct = level * albedo;
-            if (b > 1.5 * direct) {
-                ++bright;
-                flux += a;
-                flux_true += b;
-                const double x = std::log1p(a / direct), y = std::log1p(b / direct);
-                sx += x;
-                sy += y;
-                sxx += x * x;
-                syy += y * y;
-                sxy += x * y;
-            } else if (b > 0.05 * direct && b < 1.2 * direct) {
-                sum += std::abs(a - b) / b;
-                bias += (a - b) / b;
-                ++count;
+/// Pixels of the true difference that stand out alone from their eight neighbours by more than a
+/// tenth of the picture's mean: fireflies of the other renderer.
+Mask find_fireflies(const ImageRgb& difference, double level) {
+    Mask found(difference.width(), difference.height());
+    for (int y = 1; y + 1 < difference.height(); ++y) {
+        for (int x = 1; x + 1 < difference.width(); ++x) {
+            std::vector<double> around;
+            for (int k = 0; k < 9; ++k) {
+                if (k != 4) around.push_back(luminance(difference(x - 1 + k % 3, y - 1 + k / 3)));
             }
+            const double off = luminance(difference(x, y)) - median(std::move(around));
+            found(x, y) = std::abs(off) > kFirefly * level ? 255 : 0;
         }
-        const double n = static_cast<double>(std::max<std::size_t>(1, bright));
-        const double correlation =
-            (sxy - sx * sy / n) /
-            std::sqrt(std::max(1e-30, (sxx - sx * sx / n) * (syy - sy * sy / n)));
-        std::printf(
-            "%s plain: mean relative error %.4f bias %+.4f (%zu px)  caustic flux %.4f "
-            "correlation %.4f (%zu px)  %.1f s\n",
-            camera.id.c_str(), sum / std::max<double>(1, double(count)),
-            bias / std::max<double>(1, double(count)), count, flux / std::max(1e-30, flux_true),
-            correlation, bright, seconds);
-        if (!options.out.empty()) {
-            write_triptych(fs::path(options.out) / (camera.id + "_plain.png"),
-                           {image.radiance, reference}, truth.linear_scale);
-            write_exr(fs::path(options.out) / (camera.id + "_plain.exr"), image.radiance);
-        }
-        std::fflush(stdout);
     }
+    return found;
 }
 
-void compare_insertion(const Options& options, const TruthScene& truth) {
+void compare_insertion(const RenderQualityOptions& options, const TruthScene& truth) {
     const fs::path folder = fs::path(options.capture) / "truth" / options.insert;
     if (!fs::exists(folder / "insert.json")) return;
     std::vector<Camera> cameras;
     for (const Camera& camera : truth.scene.cameras) {
-        if (fs::exists(folder / (camera.id + "_with.exr"))) cameras.push_back(camera);
+        const bool is_there = fs::exists(folder / (camera.id + "_with.exr"));
+        if (is_there && options.takes(camera.id)) cameras.push_back(camera);
     }
+    if (cameras.empty()) return;
     Timer timer;
-    const DifferentialRenderer renderer(truth.scene, {read_truth_insert(folder)}, cameras,
-                                        options.differential);
+    const DifferentialRenderer renderer(truth.scene,
+                                        {read_truth_insert(folder, options.object_crease_deg)},
+                                        cameras, options.differential);
     std::optional<DifferentialRenderer> second;
     if (options.has_second_seed) {
         DifferentialOptions other = options.differential;
         ++other.seed;
-        second.emplace(truth.scene, std::vector<Part>{read_truth_insert(folder)}, cameras, other);
+        second.emplace(truth.scene,
+                       std::vector<Part>{read_truth_insert(folder, options.object_crease_deg)},
+                       cameras, other);
     }
     std::printf("%s: photons %.1f s, met %.3f\n", options.insert.c_str(), timer.seconds(),
                 static_cast<double>(renderer.photon_balance().met) /
@@ -221,6 +153,8 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
         const auto is_changed = [&](std::size_t i) {
             return around[i] < 128 && d_true[i].abs().maxCoeff() > 0.02 * level;
         };
+        const Mask fireflies = find_fireflies(raw_true, level);
+        const Mask near_firefly = dilate(fireflies, 6);
         for (const auto* d : {&d_render, &d_composite}) {
             // Glints of the lamp in glass are a few saturated pixels, undersampled in the truth.
             const auto is_glint = [&](std::size_t i) {
@@ -232,6 +166,10 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
             const RegionError calm =
                 region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return object[i] > 127 && near_glint[i] < 128; });
+            const RegionError smooth =
+                region_error(d_true, *d, noise, noise_variance, [&](std::size_t i) {
+                    return is_changed(i) && d_true[i].sum() > 0 && near_firefly[i] < 128;
+                });
             const RegionError e[4] = {
                 region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return object[i] > 127; }),
@@ -246,7 +184,13 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
             for (std::size_t k = 0; k < 4; ++k) {
                 std::printf("  %s %.3f (%.3f, %.3f)", names[k], e[k].error, e[k].floor, e[k].noise);
             }
-            std::printf("  object off glints %.3f  %.1f s\n", calm.error, seconds);
+            std::printf(
+                "  object off glints %.3f  brighter off fireflies %.3f (%.3f, %.3f; %.2f of it)"
+                "  %.1f s\n",
+                calm.error, smooth.error, smooth.floor, smooth.noise,
+                static_cast<double>(smooth.count) /
+                    static_cast<double>(std::max<std::size_t>(1, e[2].count)),
+                seconds);
         }
         if (second) {
             const DifferentialImage twin = second->render(camera);
@@ -268,28 +212,31 @@ void compare_insertion(const Options& options, const TruthScene& truth) {
         if (options.out.empty()) continue;
         const fs::path out = options.out;
         const std::string stem = camera.id + "_" + options.insert;
-        write_triptych(out / (stem + ".png"), {picture, with}, truth.linear_scale);
+        write_side_by_side(out / (stem + ".png"), {picture, with}, truth.linear_scale);
         ImageRgb error(plate.width(), plate.height());
         for (std::size_t i = 0; i < error.size(); ++i) {
             error[i] = 0.5f * top + 4.0f * (d_composite[i] - d_true[i]);
         }
-        write_triptych(out / (stem + "_error.png"), {error}, truth.linear_scale);
+        write_side_by_side(out / (stem + "_error.png"), {error}, truth.linear_scale);
         write_composite_exr(out / (stem + ".exr"), plate, image, camera);
     }
 }
 
 int run(int argc, char** argv) {
-    Options options;
+    RenderQualityOptions options;
     bool skip_plain = false;
     CLI::App app("Compare our renders of a capture's true scene with its true pictures");
     app.add_option("capture", options.capture, "Capture folder with truth/")->required();
     app.add_option("--insert", options.insert, "Folder of the insertion's truth");
+    app.add_option("--frames", options.frames, "Ids of the frames to look at; default all");
     app.add_option("--out", options.out, "Write pictures here");
     app.add_option("--samples", options.samples, "Samples per pixel of the plain renders");
     app.add_option("--photon-count", options.differential.photon_count, "Photons shot");
     app.add_option("--noise-target", options.differential.noise_target, "See DifferentialOptions");
     app.add_option("--max-samples", options.differential.max_samples, "See DifferentialOptions");
     app.add_option("--crease-deg", options.crease_deg, "Smooth the real parts below this angle");
+    app.add_option("--object-crease-deg", options.object_crease_deg,
+                   "Smooth the virtual object below this angle");
     app.add_flag("--second-seed", options.has_second_seed,
                  "Insert twice: what differs is our own noise");
     app.add_flag("--skip-plain", skip_plain, "Insertion alone");

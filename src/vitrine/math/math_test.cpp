@@ -145,5 +145,29 @@ TEST(Sampling, DiscreteDistributionMatchesItsWeights) {
     EXPECT_DOUBLE_EQ(distribution.probability(2), 0.3);
 }
 
+TEST(Sampling, DiscreteDistributionInvertsTheRunningSum) {
+    // Weights over many orders of magnitude, with empty runs at both ends and within.
+    std::vector<double> weights;
+    Rng rng(6);
+    for (int i = 0; i < 1000; ++i) {
+        const bool is_empty = i < 50 || i >= 950 || i % 7 == 0;
+        weights.push_back(is_empty ? 0.0 : std::pow(rng.next_double(), 12));
+    }
+    const DiscreteDistribution distribution(weights);
+    double sum = 0;
+    for (const double w : weights) sum += w;
+    double below = 0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+        const double p = weights[i] / sum;
+        EXPECT_NEAR(distribution.probability(i), p, 1e-12);
+        float u = static_cast<float>(below + 0.5 * p);
+        if (p > 1e-5) {
+            EXPECT_EQ(distribution.sample(u), i);
+        }
+        below += p;
+    }
+    EXPECT_TRUE(DiscreteDistribution().empty());
+}
+
 }  // namespace
 }  // namespace vitrine

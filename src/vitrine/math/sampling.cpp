@@ -186,11 +186,21 @@ DiscreteDistribution::DiscreteDistribution(std::span<const double> weights) {
     for (std::size_t i = 0; i < cdf_.size(); ++i) {
         cdf_[i] = sum_ > 0 ? cdf_[i] / sum_ : static_cast<double>(i) / weights.size();
     }
+    guide_.resize(weights.size());
+    std::size_t index = 0;
+    for (std::size_t k = 0; k < guide_.size(); ++k) {
+        // Half a step early, so that rounding never begins too far.
+        const double start = (static_cast<double>(k) - 0.5) / static_cast<double>(guide_.size());
+        while (index + 1 < guide_.size() && cdf_[index + 1] <= start) ++index;
+        guide_[k] = static_cast<std::uint32_t>(index);
+    }
 }
 
 std::size_t DiscreteDistribution::sample(float& u) const {
-    const auto above = std::upper_bound(cdf_.begin() + 1, cdf_.end() - 1, static_cast<double>(u));
-    const auto index = static_cast<std::size_t>(above - cdf_.begin()) - 1;
+    const std::size_t count = guide_.size();
+    const auto place = static_cast<std::size_t>(static_cast<double>(u) * double(count));
+    std::size_t index = guide_[std::min(place, count - 1)];
+    while (index + 1 < count && cdf_[index + 1] <= static_cast<double>(u)) ++index;
     const double width = cdf_[index + 1] - cdf_[index];
     u = width > 0 ? static_cast<float>((u - cdf_[index]) / width) : 0.0f;
     u = std::clamp(u, 0.0f, kOneMinusEpsilon);

@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "render/interface.h"
+#include "render/photon_targets.h"
 #include "render/sampler.h"
 
 #include <span>
@@ -13,81 +14,6 @@ namespace {
 constexpr float kFaintBranchBoost = 4.0f;
 /// The share below which a branch is left to chance at all.
 constexpr float kSurePower = 0.25f;
-constexpr float kSoftRadiusFactor = 4.0f;
-constexpr float kWideRadiusFactor = 8.0f;
-constexpr float kBroadRadiusFactor = 32.0f;
-constexpr float kNearFactor = 16.0f;
-constexpr float kMergeShare = 0.3f;  // of the gather radius
-/// Share of new photons that a progressive pass keeps: 2/3 shrinks noise and blur at equal rates.
-constexpr double kProgressiveShare = 2.0 / 3.0;
-
-struct Target {
-    std::size_t light = 0;
-    int part = 0;
-    Sphere sphere;
-    std::uint64_t count = 0;
-    std::uint64_t key = 0;
-};
-
-float bending_weight(const Material& material) {
-    if (std::holds_alternative<Dielectric>(material)) return 1.0f;
-    if (const auto* mirror = std::get_if<Mirror>(&material)) {
-        return mirror->reflectance.maxCoeff() > 0 ? 1.0f : 0.0f;
-    }
-    // A glossy lobe blurs: half the photons do.
-    if (const auto* ward = std::get_if<Ward>(&material)) {
-        return ward->rho_s.maxCoeff() > 0 ? 0.5f : 0.0f;
-    }
-    if (const auto* translucent = std::get_if<Translucent>(&material)) {
-        return translucent->sigma > 0 ? 0.1f : 0.0f;  // its interface reflects 3 to 5 %
-    }
-    return 0.0f;
-}
-
-/// Sphere around the vertices: centre of the box, farthest vertex.
-Sphere sphere_around(const Mesh& mesh) {
-    Sphere sphere;
-    sphere.centre = bounds(mesh).centre().cast<float>();
-    for (const Vec3f& v : mesh.vertices) {
-        sphere.radius = std::max(sphere.radius, (v - sphere.centre).norm());
-    }
-    sphere.radius *= 1.0001f;  // rays along the outline belong to it
-    return sphere;
-}
-
-std::vector<Target> find_targets(const RenderScene& scene, const CausticOptions& options) {
-    std::vector<Target> targets;
-    std::vector<double> weights;
-    double sum = 0;
-    for (std::size_t light = 0; light < scene.lights().count(); ++light) {
-        for (std::size_t p = 0; p < scene.scene().parts.size(); ++p) {
-            const Part& part = scene.scene().parts[p];
-            const float bending = bending_weight(part.material);
-            if (bending <= 0 || part.mesh->empty()) continue;
-            Target target{light, static_cast<int>(p), sphere_around(*part.mesh), 0,
-                          stream_key(options.seed, light, p, 0xca05u)};
-            // Power towards the part, by a few rays: shares photons among the lights fairly.
-            double power = 0;
-            constexpr std::uint32_t kPilotRays = 64;
-            for (std::uint32_t i = 0; i < kPilotRays; ++i) {
-                const PathSampler sampler(target.key ^ 1u, i);
-                power += scene.lights()
-                             .emit(light, target.sphere, sampler.pair(0, 0), sampler.pair(0, 1),
-                                   scene.bounding_sphere())
-                             .power.sum();
-            }
-            if (!(power > 0)) continue;
-            weights.push_back(power * bending);
-            sum += weights.back();
-            targets.push_back(target);
-        }
-    }
-    for (std::size_t i = 0; i < targets.size(); ++i) {
-        targets[i].count = static_cast<std::uint64_t>(
-            std::ceil(static_cast<double>(options.photon_count) * weights[i] / sum));
-    }
-    return targets;
-}
 
 /// One ray under way through smooth and glossy parts.
 struct Flight {
@@ -116,7 +42,7 @@ class Tracer {
 
     /// Follows the photons `group.indices` of `target` among the parts of `view`. All go on by one
     /// surface at a time: neighbours take much the same way, and are traced together.
-    void trace(const Target& target, std::uint32_t view, Group& group,
+    void trace(const PhotonTarget& target, std::uint32_t view, Group& group,
                PhotonBalance& balance) const {
         group.is_touched.assign(group.indices.size(), 0);
         group.arrivals.clear();
@@ -169,7 +95,7 @@ class Tracer {
         for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = scene_.closest(rays[i]);
     }
 
-    Flight emit(const Target& target, std::uint64_t index) const {
+    Flight emit(const PhotonTarget& target, std::uint64_t index) const {
         const PathSampler sampler(target.key, static_cast<std::uint32_t>(index));
         const Vec2f on_light = scene_.lights().needs_position(target.light)
                                    ? sampler.further_pair(0)
@@ -185,7 +111,7 @@ class Tracer {
     }
 
     /// False when nothing that counts was met.
-    bool goes_on(const Target& target, const Flight& flight, const Hit& hit,
+    bool goes_on(const PhotonTarget& target, const Flight& flight, const Hit& hit,
                  PhotonBalance& balance) const {
         const double power = flight.power.sum();
         if (!hit.is_hit()) {
@@ -325,38 +251,7 @@ class Tracer {
     const CausticOptions& options_;
 };
 
-/// The photons [first, first + count) of a target, those sent in nearly the same direction one
-/// after the other: rays that run beside their neighbours share the work of finding what they meet.
-std::vector<std::uint64_t> coherent_order(const Target& target, std::uint64_t first,
-                                          std::uint64_t count) {
-    constexpr unsigned kBits = 9;  // per axis: as many cells as half a chunk has photons
-    constexpr std::size_t kCells = std::size_t{1} << (2 * kBits);
-    std::vector<std::uint32_t> cell(count);
-    std::vector<std::uint32_t> start(kCells + 1, 0);
-    for (std::uint64_t k = 0; k < count; ++k) {
-        const Vec2f u = PathSampler(target.key, static_cast<std::uint32_t>(first + k)).pair(0, 0);
-        const auto x = static_cast<unsigned>(u.x() * (1u << kBits));
-        const auto y = static_cast<unsigned>(u.y() * (1u << kBits));
-        unsigned code = 0;  // bits interleaved (Morton 1966)
-        for (unsigned bit = 0; bit < kBits; ++bit) {
-            code |= (x >> bit & 1u) << (2 * bit) | (y >> bit & 1u) << (2 * bit + 1);
-        }
-        cell[k] = code;
-        ++start[code + 1];
-    }
-    for (std::size_t c = 0; c < kCells; ++c) start[c + 1] += start[c];
-    std::vector<std::uint64_t> order(count);
-    for (std::uint64_t k = 0; k < count; ++k) order[start[cell[k]]++] = first + k;
-    return order;
-}
-
 }  // namespace
-
-double progressive_radius(double first_m, int pass) {
-    double area = first_m * first_m;
-    for (int k = 1; k <= pass; ++k) area *= (k + kProgressiveShare) / (k + 1);
-    return std::sqrt(area);
-}
 
 PhotonBalance& PhotonBalance::operator+=(const PhotonBalance& other) {
     emitted += other.emitted;
@@ -383,7 +278,7 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
         PhotonBalance balance;
     };
     // In the scene with virtual parts, and where these are met in the one without.
-    const auto trace_both = [&](const Target& target, Group& group, Block& block) {
+    const auto trace_both = [&](const PhotonTarget& target, Group& group, Block& block) {
         tracer.trace(target, kAllParts, group, block.balance);
         for (std::size_t k = 0; has_virtual && k < group.arrivals.size(); ++k) {
             if (group.is_touched[group.slots[k]]) group.arrivals[k].views = kVirtualParts;
@@ -399,9 +294,9 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
         tracer.trace(target, kRealParts, group, ignored);
         block.photons.insert(block.photons.end(), group.arrivals.begin(), group.arrivals.end());
     };
-    const std::vector<Target> targets = find_targets(scene, options);
+    const std::vector<PhotonTarget> targets = find_targets(scene, options);
     std::size_t done = 0;
-    for (const Target& target : targets) {
+    for (const PhotonTarget& target : targets) {
         const std::uint64_t first = target.count * static_cast<std::uint64_t>(options.pass);
         const std::size_t size_before = result.photons.size();
         // A chunk at a time: photons wait in their blocks beside the list for its share alone.
@@ -437,33 +332,6 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
                         "photons");
     }
     return result;
-}
-
-CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather_radius_m) {
-    const auto radius = static_cast<float>(gather_radius_m);
-    CausticMaps maps;
-    const float soft_radius = kSoftRadiusFactor * radius, wide_radius = kWideRadiusFactor * radius;
-    std::vector<Photon> sharp = merge_photons(photons, kMergeShare * radius, PhotonChoice::Sharp);
-    const std::vector<Photon> soft =
-        merge_photons(photons, kMergeShare * soft_radius, PhotonChoice::Soft);
-    maps.sharp = PhotonGrid(sharp, radius);
-    maps.soft = PhotonGrid(soft, soft_radius);
-    sharp.insert(sharp.end(), soft.begin(), soft.end());
-    for (Photon& photon : sharp) photon.keeps_direction = false;
-    const std::vector<Photon> merged = merge_photons(sharp, kMergeShare * wide_radius);
-    maps.wide = PhotonGrid(merged, wide_radius);
-    const float broad_radius = kBroadRadiusFactor * radius;
-    maps.broad = PhotonGrid(merge_photons(merged, kMergeShare * broad_radius), broad_radius);
-    std::vector<double> weights;
-    for (const Photon& photon : merged) {
-        const Rgb flux = photon.power * photon.diffuse_albedo();
-        if (!(flux > 0).any()) continue;
-        maps.secondary.push_back({photon.position, photon.normal.unpack(), flux, photon.views});
-        weights.push_back(luminance(flux));
-    }
-    if (!weights.empty()) maps.secondary_choice = GuidedChoice(weights);
-    maps.near_m = kNearFactor * radius;
-    return maps;
 }
 
 }  // namespace vitrine

@@ -8,7 +8,6 @@
 #pragma once
 
 #include "base/progress.h"
-#include "render/guided_choice.h"
 #include "render/photon_grid.h"
 #include "render/render_scene.h"
 
@@ -21,11 +20,6 @@ struct CausticOptions {
     int pass = 0;  ///< which stretch of `photon_count` rays of the endless sequence to shoot
     std::uint64_t seed = 0;
 };
-
-/// Gather radius of pass k = 0, 1, ... of a progressive picture whose first pass has `first_m`
-/// (Knaus and Zwicker 2011, "Progressive photon mapping: a probabilistic approach", eq. 20): the
-/// passes' mean loses both its blur and its noise as their number grows.
-double progressive_radius(double first_m, int pass);
 
 /// Where the power went, in W over the three channels: emitted = stored + escaped + absorbed +
 /// ended + chance, up to rounding.
@@ -47,31 +41,5 @@ struct CausticPhotons {
 };
 CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& options,
                               const Progress& progress = {});
-
-/// A patch of a caustic that scatters light on (Keller 1997, "Instant radiosity").
-struct SecondaryLight {
-    Vec3f position = Vec3f::Zero();
-    Vec3f normal = Vec3f::Zero();
-    Rgb flux = Rgb::Zero();  ///< reflected diffusely, W
-    std::uint8_t views = 3;
-};
-
-/// Photons made ready for look-up: sharp ones with the radius asked for, soft ones (glossy lobes)
-/// with four times that. Light that a caustic scatters on to other surfaces comes from `secondary`
-/// lights when these are farther than `near_m`, and nearer by from paths that find the `wide` map:
-/// paths alone would meet a small bright spot too seldom, and lights too near are too bright. What
-/// reaches it by way of glass or mirrors is left to paths that find the `broad` map, in which the
-/// spot is 32 times the radius asked for: seldom met, it must not be bright.
-struct CausticMaps {
-    PhotonGrid sharp;
-    PhotonGrid soft;
-    PhotonGrid wide;
-    PhotonGrid broad;
-    std::vector<SecondaryLight> secondary;
-    GuidedChoice secondary_choice;
-    float near_m = 0.0f;
-    bool empty() const { return sharp.empty() && soft.empty(); }
-};
-CausticMaps build_caustic_maps(const std::vector<Photon>& photons, double gather_radius_m);
 
 }  // namespace vitrine

@@ -5,6 +5,7 @@
 #include "geometry/primitives.h"
 #include "math/statistics.h"
 #include "optics/fresnel.h"
+#include "render/caustic_maps.h"
 #include "render/differential.h"
 
 #include <gtest/gtest.h>
@@ -308,7 +309,7 @@ TEST(CausticMaps, SecondaryLightsAreChosenByTheirFlux) {
     }
     for (int k = 0; k < kDraws; ++k) {
         float u = rng.next_float();
-        observed[maps.secondary_choice.pick(u)] += 1;
+        observed[maps.secondary_choice.sample(u)] += 1;
     }
     EXPECT_GT(chi_square_test(observed, expected).p_value, 0.001);
 }

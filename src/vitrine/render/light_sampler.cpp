@@ -1,7 +1,6 @@
 #include "render/light_sampler.h"
 
 #include "base/error.h"
-#include "math/rigid3.h"
 
 namespace vitrine {
 namespace {
@@ -14,16 +13,6 @@ float spot_factor(const SpotLight& spot, const Vec3f& from_light) {
     const double angle = angle_between(spot.direction, from_light.cast<double>());
     const double t = std::clamp((half - angle) / (0.1 * half), 0.0, 1.0);
     return static_cast<float>(t * t * (3.0 - 2.0 * t));
-}
-
-float disc_area(const DiscLight& disc) {
-    return kPif * static_cast<float>(disc.radius_m * disc.radius_m);
-}
-
-Vec3f disc_point(const DiscLight& disc, const Vec2f& u) {
-    const Vec2f d = sample_concentric_disc(u) * static_cast<float>(disc.radius_m);
-    const Frame frame(disc.normal.cast<float>());
-    return disc.position_m.cast<float>() + frame.tangent * d.x() + frame.bitangent * d.y();
 }
 
 struct Cell {
@@ -45,9 +34,26 @@ float row_solid_angle(const ImageRgb& map, int y) {
 
 }  // namespace
 
+LightSampler::Disc::Disc(const DiscLight& light)
+    : position(light.position_m.cast<float>()),
+      frame(light.normal.cast<float>()),
+      radius(static_cast<float>(light.radius_m)),
+      area(kPif * static_cast<float>(light.radius_m * light.radius_m)),
+      intensity(light.intensity_w_per_sr),
+      radiance(light.intensity_w_per_sr / area) {}
+
+Vec3f LightSampler::Disc::point(const Vec2f& u) const {
+    const Vec2f d = sample_concentric_disc(u) * radius;
+    return position + frame.tangent * d.x() + frame.bitangent * d.y();
+}
+
 LightSampler::LightSampler(std::vector<Light> lights, const Rgb& ambient_radiance)
-    : lights_(std::move(lights)), tables_(lights_.size()), ambient_(ambient_radiance) {
+    : lights_(std::move(lights)),
+      discs_(lights_.size()),
+      tables_(lights_.size()),
+      ambient_(ambient_radiance) {
     for (std::size_t i = 0; i < lights_.size(); ++i) {
+        if (const auto* disc = std::get_if<DiscLight>(&lights_[i])) discs_[i].emplace(*disc);
         const auto* environment = std::get_if<EnvironmentLight>(&lights_[i]);
         if (!environment) continue;
         environments_.push_back(i);
@@ -110,7 +116,13 @@ std::optional<LightSample> LightSampler::sample(std::size_t light, const Vec3f& 
         s.direction = d / s.distance;
         return s.distance > 0;
     };
-    if (const auto* l = std::get_if<PointLight>(&lights_[light])) {
+    if (const auto& disc = discs_[light]) {
+        if (!towards(disc->point(u))) return std::nullopt;
+        const float cos_light = -s.direction.dot(disc->frame.normal);
+        if (cos_light <= 0) return std::nullopt;
+        s.pdf = s.distance * s.distance / (cos_light * disc->area);
+        s.radiance_over_pdf = disc->intensity * (cos_light / (s.distance * s.distance));
+    } else if (const auto* l = std::get_if<PointLight>(&lights_[light])) {
         if (!towards(l->position_m.cast<float>())) return std::nullopt;
         s.radiance_over_pdf = l->intensity_w_per_sr / (s.distance * s.distance);
     } else if (const auto* spot = std::get_if<SpotLight>(&lights_[light])) {
@@ -118,12 +130,6 @@ std::optional<LightSample> LightSampler::sample(std::size_t light, const Vec3f& 
         const float factor = spot_factor(*spot, -s.direction);
         if (factor <= 0) return std::nullopt;
         s.radiance_over_pdf = spot->intensity_w_per_sr * (factor / (s.distance * s.distance));
-    } else if (const auto* disc = std::get_if<DiscLight>(&lights_[light])) {
-        if (!towards(disc_point(*disc, u))) return std::nullopt;
-        const float cos_light = -s.direction.dot(disc->normal.cast<float>());
-        if (cos_light <= 0) return std::nullopt;
-        s.pdf = s.distance * s.distance / (cos_light * disc_area(*disc));
-        s.radiance_over_pdf = disc->intensity_w_per_sr * (cos_light / (s.distance * s.distance));
     } else if (const auto* sun = std::get_if<DirectionalLight>(&lights_[light])) {
         s.direction = -sun->direction.cast<float>();
         s.distance = kFar;
@@ -139,9 +145,9 @@ std::optional<LightSample> LightSampler::sample(std::size_t light, const Vec3f& 
 
 float LightSampler::pdf(std::size_t light, const Vec3f&, const Vec3f& direction,
                         float distance) const {
-    if (const auto* disc = std::get_if<DiscLight>(&lights_[light])) {
-        const float cos_light = -direction.dot(disc->normal.cast<float>());
-        return cos_light > 0 ? distance * distance / (cos_light * disc_area(*disc)) : 0.0f;
+    if (const auto& disc = discs_[light]) {
+        const float cos_light = -direction.dot(disc->frame.normal);
+        return cos_light > 0 ? distance * distance / (cos_light * disc->area) : 0.0f;
     }
     if (tables_[light]) return environment_pdf(light, direction);
     return 0.0f;
@@ -150,17 +156,18 @@ float LightSampler::pdf(std::size_t light, const Vec3f&, const Vec3f& direction,
 std::optional<LightSampler::Hit> LightSampler::hit(std::size_t light, const Vec3f& origin,
                                                    const Vec3f& direction,
                                                    float max_distance) const {
-    const auto* disc = std::get_if<DiscLight>(&lights_[light]);
+    const auto& disc = discs_[light];
     if (!disc) return std::nullopt;
-    const Vec3f normal = disc->normal.cast<float>();
+    const Vec3f& normal = disc->frame.normal;
     const float slope = direction.dot(normal);
     if (slope >= 0) return std::nullopt;
-    const Vec3f to_centre = disc->position_m.cast<float>() - origin;
+    const Vec3f to_centre = disc->position - origin;
     const float t = to_centre.dot(normal) / slope;
-    const auto radius = static_cast<float>(disc->radius_m);
     if (t <= 0 || t >= max_distance) return std::nullopt;
-    if ((t * direction - to_centre).squaredNorm() > radius * radius) return std::nullopt;
-    return Hit{light, t, disc->intensity_w_per_sr / disc_area(*disc)};
+    if ((t * direction - to_centre).squaredNorm() > disc->radius * disc->radius) {
+        return std::nullopt;
+    }
+    return Hit{light, t, disc->radiance};
 }
 
 EmittedRay LightSampler::emit(std::size_t light, const Sphere& target, const Vec2f& u_direction,
@@ -196,10 +203,10 @@ EmittedRay LightSampler::emit(std::size_t light, const Sphere& target, const Vec
     } else if (const auto* spot = std::get_if<SpotLight>(&lights_[light])) {
         const float solid_angle = aim_from(spot->position_m.cast<float>());
         ray.power = spot->intensity_w_per_sr * (solid_angle * spot_factor(*spot, ray.direction));
-    } else if (const auto* disc = std::get_if<DiscLight>(&lights_[light])) {
-        const float solid_angle = aim_from(disc_point(*disc, u_position));
-        const float cos_light = ray.direction.dot(disc->normal.cast<float>());
-        ray.power = disc->intensity_w_per_sr * (std::max(0.0f, cos_light) * solid_angle);
+    } else if (const auto& disc = discs_[light]) {
+        const float solid_angle = aim_from(disc->point(u_position));
+        const float cos_light = ray.direction.dot(disc->frame.normal);
+        ray.power = disc->intensity * (std::max(0.0f, cos_light) * solid_angle);
     } else if (const auto* sun = std::get_if<DirectionalLight>(&lights_[light])) {
         ray.power = sun->irradiance_w_per_m2 * aim_along(sun->direction.cast<float>(), u_direction);
     } else {

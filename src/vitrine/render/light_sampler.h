@@ -2,6 +2,7 @@
 // surface point towards a light, and from a light towards a part that will bend its rays.
 #pragma once
 
+#include "math/rigid3.h"
 #include "math/sampling.h"
 #include "scene/light.h"
 
@@ -53,12 +54,9 @@ class LightSampler {
                            float max_distance) const;
     /// Whether `sample` and `emit` use their position: lights with size and environment maps.
     bool needs_position(std::size_t light) const {
-        return std::holds_alternative<DiscLight>(lights_[light]) ||
-               std::holds_alternative<EnvironmentLight>(lights_[light]);
+        return discs_[light].has_value() || tables_[light];
     }
-    bool can_be_hit(std::size_t light) const {
-        return std::holds_alternative<DiscLight>(lights_[light]);
-    }
+    bool can_be_hit(std::size_t light) const { return discs_[light].has_value(); }
 
     /// Uniform environment beside the maps.
     const Rgb& ambient() const { return ambient_; }
@@ -78,10 +76,20 @@ class LightSampler {
         DiscreteDistribution rows;
         std::vector<DiscreteDistribution> columns;
     };
+    /// A disc lamp as rays need it.
+    struct Disc {
+        explicit Disc(const DiscLight& light);
+        Vec3f point(const Vec2f& u) const;
+        Vec3f position;
+        Frame frame;  // normal: the side that emits
+        float radius, area;
+        Rgb intensity, radiance;
+    };
     Vec3f sample_environment(std::size_t light, Vec2f u, float& pdf) const;
     float environment_pdf(std::size_t light, const Vec3f& direction) const;
 
     std::vector<Light> lights_;
+    std::vector<std::optional<Disc>> discs_;  // per light, empty if no disc
     std::vector<std::size_t> environments_;
     std::vector<std::shared_ptr<const EnvironmentTable>> tables_;  // per light, null if no map
     Rgb ambient_ = Rgb::Zero();

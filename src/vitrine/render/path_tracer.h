@@ -6,12 +6,13 @@
 // photons, or found by paths that happen on a light with size.
 #pragma once
 
-#include "render/caustics.h"
+#include "render/caustic_maps.h"
 #include "render/render_scene.h"
 #include "render/sampler.h"
 #include "render/translucent_light.h"
 
 #include <array>
+#include <span>
 
 namespace vitrine {
 
@@ -47,11 +48,24 @@ struct SoftLight {
 struct PathResult {
     std::array<Rgb, kLayerCount> layers;  ///< without the soft light
     SoftLight soft;
-    bool is_touched = false;  ///< a virtual part had a say in it
-    int first_part = -1;      ///< met by the camera ray itself; -1: none
+    int first_part = -1;  ///< met by the camera ray itself; -1: none
     PathResult() { layers.fill(Rgb::Zero()); }
     Rgb sharp() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
     Rgb total() const { return sharp() + soft.shadow + soft.diffuse; }
+};
+
+/// One path in the scene with virtual parts and in the one without.
+class PathPair {
+  public:
+    const PathResult& with() const { return with_; }
+    const PathResult& without() const { return is_touched_ ? without_ : with_; }
+    /// A virtual part had a say in it; else both are the same, bit by bit.
+    bool is_touched() const { return is_touched_; }
+
+  private:
+    friend class PathTracer;
+    PathResult with_, without_;  // the second counts from where they part
+    bool is_touched_ = false;
 };
 
 /// Sample `index` of a pixel: a ray through a place in its square, and the path's random numbers.
@@ -73,6 +87,8 @@ inline CameraSample camera_sample(const Camera& camera, std::uint64_t seed, int 
 struct PathWish {
     bool finds_soft = true;  ///< false: leaves the soft light out, for a fraction of the cost
     int light_samples = 1;   ///< shadow rays to each lamp with size, from the surface seen
+    /// What the camera ray meets, where it is known: neighbours are found together. May be null.
+    const Hit* first = nullptr;
 };
 
 class PathTracer {
@@ -82,48 +98,58 @@ class PathTracer {
     PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options = {},
                const TranslucentLight* translucent = nullptr);
 
-    /// @param view kAllParts for the scene with its virtual parts, kRealParts for the one without
+    /// In the scene with its virtual parts, if it has any.
     PathResult trace(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
-                     std::uint32_t view, const PathWish& wish = {}) const;
+                     const PathWish& wish = {}) const;
+
+    /// In the scene with its virtual parts and in the one without. What both have in common is
+    /// traced once: they part where a ray meets a virtual part, and go on with the same numbers.
+    PathPair trace_both(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
+                        const PathWish& wish = {}) const;
 
     /// Irradiance / pi that enters a translucent body at `point` along one path. Photons that land
     /// on it are left out: they are known one by one.
-    PathResult entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
-                        std::uint32_t view) const;
+    /// @param views scenes in which the point lies free: kVirtualParts the one with these, which
+    ///     begins here, kRealParts the one without
+    PathPair entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
+                      std::uint32_t views) const;
 
   private:
     struct State;
     struct Pending;
-    void follow(State state, Pending& pending, const PathSampler& sampler, std::uint32_t view,
-                const PathWish& wish, PathResult& result) const;
-    static void add(const State& state, Layer layer, const Rgb& radiance, PathResult& result);
-    void add_emission(const State& state, float distance, PathResult& result) const;
-    void add_environment(const State& state, PathResult& result) const;
+    struct Sink;
+    void follow(State state, Pending& pending, const PathSampler& sampler, const PathWish& wish,
+                Sink& sink) const;
+    void add_emission(const State& state, float distance, Sink& sink) const;
+    void add_environment(const State& state, Sink& sink) const;
     void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                     const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
-                    std::uint32_t view, int light_samples, PathResult& result) const;
+                    int light_samples, Sink& sink) const;
     /// Of the lobes towards a light that was picked with a density (0: a light without size).
     Rgb direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
                      float light_pdf) const;
     void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                      const Frame& frame, const Vec3f& wo, std::uint32_t view,
-                      PathResult& result) const;
+                      const Frame& frame, const Vec3f& wo, Sink& sink) const;
     void add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                      const Vec3f& wo, std::uint32_t view, PathResult& result) const;
+                      const Vec3f& wo, Sink& sink) const;
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                       const PathSampler& sampler, std::uint32_t view, PathResult& result) const;
-    void finish(Pending& pending, const PathSampler& sampler, std::uint32_t view,
-                const PathWish& wish, PathResult& result) const;
+                       const PathSampler& sampler, Sink& sink) const;
+    /// Follows the path and all that branches off.
+    void finish(const State& first, const PathSampler& sampler, const PathWish& wish,
+                Sink& sink) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
     bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,
                         const PathSampler& sampler) const;
-    bool is_hidden(const Ray& ray, std::uint32_t view, PathResult& result) const;
+    /// Of the scenes `views`, those in which nothing is in the way of each ray; sets
+    /// the rays' masks.
+    void find_free(std::span<Ray> rays, std::uint32_t views, std::uint32_t* free) const;
 
     const RenderScene& scene_;
     const CausticMaps* caustics_;
     PathOptions options_;
     const TranslucentLight* translucent_;
+    bool has_virtual_;
 };
 
 }  // namespace vitrine

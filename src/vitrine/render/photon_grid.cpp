@@ -27,7 +27,7 @@ PackedDirection::PackedDirection(const Vec3f& unit) {
     y = to_steps(p.y());
 }
 
-Vec3f PackedDirection::unpack() const {
+Vec3f PackedDirection::along() const {
     Vec3f v(static_cast<float>(x) / 32767.0f, static_cast<float>(y) / 32767.0f, 0);
     v.z() = 1 - std::abs(v.x()) - std::abs(v.y());
     if (v.z() < 0) {
@@ -35,7 +35,7 @@ Vec3f PackedDirection::unpack() const {
         v.x() = (1 - std::abs(v.y())) * sign_not_zero(old_x);
         v.y() = (1 - std::abs(old_x)) * sign_not_zero(v.y());
     }
-    return v.normalized();
+    return v;
 }
 
 PhotonGrid::PhotonGrid(const std::vector<Photon>& photons, float radius_m)
@@ -53,6 +53,10 @@ PhotonGrid::PhotonGrid(const std::vector<Photon>& photons, float radius_m)
     photons_.resize(photons.size());
     std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
     for (const Photon& photon : photons) photons_[next[bucket_at(photon)]++] = photon;
+    occupied_.assign((buckets >> 9) + 1, 0);
+    for (std::uint32_t b = 0; b < buckets; ++b) {
+        if (start_[b] < start_[b + 1]) occupied_[b >> 9] |= std::uint64_t{1} << (b >> 3 & 63u);
+    }
 }
 
 namespace {

@@ -14,8 +14,17 @@ struct PackedDirection {
     std::int16_t x = 0, y = 0;
     PackedDirection() = default;
     explicit PackedDirection(const Vec3f& unit);
-    Vec3f unpack() const;
+    /// A vector of its direction, of any length.
+    Vec3f along() const;
+    Vec3f unpack() const { return along().normalized(); }
 };
+
+/// Whether the angle between `along`, of any length, and the unit vector is one of at least
+/// `min_cos` > 0.
+inline bool is_within(const Vec3f& along, const Vec3f& unit, float min_cos) {
+    const float d = along.dot(unit);
+    return d > 0 && d * d >= min_cos * min_cos * along.squaredNorm();
+}
 
 /// 36 bytes.
 struct Photon {
@@ -40,7 +49,7 @@ struct Photon {
 static_assert(sizeof(Photon) == 36);
 
 /// Photons sorted into cells of twice the gather radius. Building is linear in the count; memory is
-/// 36 bytes per photon and 4 to 8 per cell; a query visits 8 cells.
+/// 36 bytes per photon and 4 to 8 per cell; a query visits 8 cells, those that hold any.
 class PhotonGrid {
   public:
     PhotonGrid() = default;
@@ -63,12 +72,15 @@ class PhotonGrid {
         const float scale = 2.0f / (kPif * radius2);
         // The look-ups wait for memory, not for each other: all buckets first, then all photons.
         std::uint32_t bucket[8], begin[8], end[8];
-        int count = 0;
+        int bucket_count = 0, count = 0;
         for (int corner = 0; corner < 8; ++corner) {
-            bucket[corner] =
+            const std::uint32_t b =
                 bucket_of(low + Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2));
+            // Most places are dark, which a table small enough for the nearest cache says.
+            if (!(occupied_[b >> 9] >> (b >> 3 & 63u) & 1u)) continue;
+            bucket[bucket_count++] = b;
         }
-        for (int corner = 0; corner < 8; ++corner) {
+        for (int corner = 0; corner < bucket_count; ++corner) {
             bool is_repeated = false;  // two cells in one bucket must not count twice
             for (int k = 0; k < corner; ++k) is_repeated |= bucket[k] == bucket[corner];
             const std::uint32_t first = start_[bucket[corner]], last = start_[bucket[corner] + 1];
@@ -85,7 +97,7 @@ class PhotonGrid {
                 if (distance2 >= radius2) continue;
                 // Same sheet: near the tangent plane and facing alike.
                 if (std::abs(d.dot(normal)) > kMaxHeight * radius_) continue;
-                if (photon.normal.unpack().dot(normal) < kMinNormalCos) continue;
+                if (!is_within(photon.normal.along(), normal, kMinNormalCos)) continue;
                 visit(photon, scale * (1.0f - distance2 / radius2));
             }
         }
@@ -105,8 +117,9 @@ class PhotonGrid {
         return ((hash ^ hash >> 15) << 3 | corner) & bucket_mask_;
     }
 
-    std::vector<Photon> photons_;       // sorted by bucket, input order within
-    std::vector<std::uint32_t> start_;  // first photon of each bucket, and the end
+    std::vector<Photon> photons_;          // sorted by bucket, input order within
+    std::vector<std::uint32_t> start_;     // first photon of each bucket, and the end
+    std::vector<std::uint64_t> occupied_;  // a bit per block of 8 buckets: it holds photons
     std::uint32_t bucket_mask_ = 0;
     float radius_ = 0.0f;
     float inverse_cell_ = 0.0f;

@@ -1,5 +1,7 @@
 #include "render/pixel_samples.h"
 
+#include <optional>
+
 namespace vitrine {
 namespace {
 
@@ -62,21 +64,39 @@ PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMa
 
 void PixelSampler::add_samples(int x, int y, int target, int soft_target, int light_samples,
                                PixelSums& sums) const {
-    for (; sums.count < std::max(target, soft_target); ++sums.count) {
-        const bool finds_soft = sums.soft_count < soft_target;
-        add_sample(x, y, {finds_soft, finds_soft ? 1 : light_samples}, sums);
-        sums.soft_count += finds_soft ? 1 : 0;
+    // The camera rays of a pixel run side by side: what they meet is found together.
+    constexpr int kTogether = 16;
+    const int end = std::max(target, soft_target);
+    std::array<std::optional<CameraSample>, kTogether> samples;
+    std::array<Ray, kTogether> rays;
+    std::array<Hit, kTogether> hits;
+    while (sums.count < end) {
+        const int first = sums.count, count = std::min(kTogether, end - first);
+        for (int k = 0; k < count; ++k) {
+            const auto slot = static_cast<std::size_t>(k);
+            samples[slot] = camera_sample(camera_, seed_, x, y, first + k);
+            rays[slot] = {origin_, samples[slot]->direction, 0.0f, 1e30f, kAllParts};
+        }
+        const auto some = static_cast<std::size_t>(count);
+        scene_.closest(std::span<const Ray>(rays).first(some), std::span(hits).first(some));
+        for (std::size_t k = 0; k < some; ++k) {
+            const bool finds_soft = sums.soft_count < soft_target;
+            add_sample(x, y, *samples[k], {finds_soft, finds_soft ? 1 : light_samples, &hits[k]},
+                       sums);
+            ++sums.count;
+            sums.soft_count += finds_soft ? 1 : 0;
+        }
     }
 }
 
-void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sums) const {
-    const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
+void PixelSampler::add_sample(int x, int y, const CameraSample& sample, const PathWish& wish,
+                              PixelSums& sums) const {
+    const auto& [sampler, direction] = sample;
     // Neighbours begin with different passes: soft light is averaged over them.
     const auto turn = static_cast<std::size_t>(sums.count + x + 2 * y);
     const PathTracer& tracer = tracers_[turn % tracers_.size()];
-    const PathResult with = tracer.trace(origin_, direction, sampler, kAllParts, wish);
-    const PathResult without =
-        with.is_touched ? tracer.trace(origin_, direction, sampler, kRealParts, wish) : with;
+    const PathPair pair = tracer.trace_both(origin_, direction, sampler, wish);
+    const PathResult &with = pair.with(), &without = pair.without();
     const bool is_covered = with.first_part >= 0 && scene_.is_virtual(with.first_part);
     const Rgb sharp = with.sharp();
     sums.with += sharp;
@@ -85,7 +105,7 @@ void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sum
     const Rgb soft_with = with.soft.shadow + with.soft.diffuse;
     const Rgb soft_without = without.soft.shadow + without.soft.diffuse;
     soft.add(with, wish.finds_soft);
-    if (wish.finds_soft && with.soft.is_present && with.is_touched) {
+    if (wish.finds_soft && with.soft.is_present && pair.is_touched()) {
         if (!is_covered) {
             const Rgb scale = 1.0f / with.soft.albedo.max(kLeastAlbedo);
             soft.shadow += scale * (with.soft.shadow - without.soft.shadow);
@@ -100,7 +120,7 @@ void PixelSampler::add_sample(int x, int y, const PathWish& wish, PixelSums& sum
         ++sums.covered;
         sums.object += sharp;
         sums.hidden += soft_without;
-    } else if (with.is_touched) {
+    } else if (pair.is_touched()) {
         for (std::size_t k = 0; k < kLayerCount; ++k) {
             sums.delta[k] += with.layers[k] - without.layers[k];
         }

@@ -56,7 +56,8 @@ class PixelSampler {
                      PixelSums& sums) const;
 
   private:
-    void add_sample(int x, int y, const PathWish& wish, PixelSums& sums) const;
+    void add_sample(int x, int y, const CameraSample& sample, const PathWish& wish,
+                    PixelSums& sums) const;
 
     const RenderScene& scene_;
     std::vector<PathTracer> tracers_;

@@ -7,6 +7,16 @@
 
 namespace vitrine {
 
+FinalOptions picture_options() {
+    FinalOptions options;
+    options.samples_per_pixel = 16;
+    options.max_samples_per_pixel = 256;
+    options.noise_target = 0.02;
+    options.soft_samples_per_pixel = 8;
+    options.caustics.gather_radius_m = 0;
+    return options;
+}
+
 Geometry render_geometry(const RenderScene& scene, const Camera& camera, std::uint32_t view) {
     Geometry geometry{ImageF(camera.width, camera.height), ImageRgb(camera.width, camera.height),
                       ImageRgb(camera.width, camera.height),
@@ -112,7 +122,7 @@ class ImageSampler {
         for (; sums.count < target; ++sums.count) {
             const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
             const PathWish wish{soft_target < 0 || sums.soft_count < soft_target, 1};
-            const PathResult path = tracer_.trace(origin_, direction, sampler, kAllParts, wish);
+            const PathResult path = tracer_.trace(origin_, direction, sampler, wish);
             if (soft_target >= 0) {
                 sums.soft.add(path, wish.finds_soft);
                 sums.soft_count += wish.finds_soft ? 1 : 0;

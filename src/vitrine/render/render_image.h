@@ -26,6 +26,10 @@ struct FinalOptions {
     std::uint64_t seed = 0;
 };
 
+/// For a picture to be looked at: most paths where it is noisy, soft light averaged, first photons
+/// gathered within half a pixel's width.
+FinalOptions picture_options();
+
 struct RenderedImage {
     ImageRgb radiance;  ///< linear, W/(m2 sr)
     ImageF variance;    ///< of the luminance of each pixel's mean, from the spread of its samples;

@@ -163,6 +163,14 @@ void RenderScene::closest(std::span<const Ray> rays, std::span<Hit> hits) const 
     }
 }
 
+void RenderScene::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const {
+    accel_.occluded(rays, occluded);
+    if (added_accel_.empty() || !(rays.front().mask & kVirtualParts)) return;
+    std::vector<std::uint8_t> added;
+    added_accel_.occluded(rays, added);
+    for (std::size_t i = 0; i < rays.size(); ++i) occluded[i] |= added[i];
+}
+
 bool RenderScene::has_bodies() const {
     return std::any_of(bodies_.begin(), bodies_.end(), [](const auto& body) { return body; });
 }

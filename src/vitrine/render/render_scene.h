@@ -78,6 +78,8 @@ class RenderScene {
         if (accel_.is_occluded(ray)) return true;
         return !added_accel_.empty() && (ray.mask & kVirtualParts) && added_accel_.is_occluded(ray);
     }
+    /// Of many rays of one mask; see `Accel::occluded`.
+    void occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const;
     /// As `Accel::nearest`.
     Hit nearest(const Vec3f& point, float max_distance) const {
         const Hit hit = accel_.nearest(point, max_distance);

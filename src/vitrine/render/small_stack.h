@@ -14,8 +14,8 @@ class SmallStack {
 
   public:
     bool empty() const { return count_ == 0; }
-    bool is_full() const { return count_ == kCapacity; }
-    /// Must not be full.
+    int size() const { return count_; }
+    /// There must be room.
     void push(const T& value) {
         new (storage_ + sizeof(T) * static_cast<std::size_t>(count_++)) T(value);
     }

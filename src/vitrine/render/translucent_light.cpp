@@ -34,23 +34,15 @@ class BodyGatherer {
         parallel_for(count, 16, [&](std::size_t i) {
             const ShadingPoint point = surface_at(i);
             Rgbd with = Rgbd::Zero(), without = Rgbd::Zero();
+            const std::uint32_t free =
+                (buried_with_[i] ? 0u : kVirtualParts) | (buried_without_[i] ? 0u : kRealParts);
             for (int s = 0; s < options_.paths_per_sample; ++s) {
                 const PathSampler sampler(stream_key(options_.seed, 0x7a15u, unsigned(part_), i),
                                           static_cast<std::uint32_t>(s));
-                PathResult all;
-                if (!buried_with_[i]) all = tracer.entering(point, eta_, sampler, kAllParts);
-                all.is_touched |= buried_with_[i] != buried_without_[i];
-                with += all.total().cast<double>();
-                if (needs_both_ && all.is_touched) {
-                    touched[i] = 1;
-                    if (!buried_without_[i]) {
-                        without += tracer.entering(point, eta_, sampler, kRealParts)
-                                       .total()
-                                       .cast<double>();
-                    }
-                } else {
-                    without += all.total().cast<double>();
-                }
+                const PathPair pair = tracer.entering(point, eta_, sampler, free);
+                with += pair.with().total().cast<double>();
+                without += pair.without().total().cast<double>();
+                if (needs_both_ && pair.is_touched()) touched[i] = 1;
             }
             const double scale = kPi / options_.paths_per_sample;
             entered.with[i] = (with * scale).cast<float>();

@@ -1,0 +1,241 @@
+// What a path finds at one surface: lights, photons, what translucent bodies send.
+#include "optics/fresnel.h"
+#include "render/path_state.h"
+
+namespace vitrine {
+namespace {
+
+/// Shadow rays that are traced together.
+constexpr std::size_t kPacket = 4;
+
+float balance(float a, float b) { return a + b > 0 ? a / (a + b) : 0.0f; }
+
+}  // namespace
+
+void PathTracer::add_emission(const State& state, float distance, Sink& sink) const {
+    if (state.is_covered) return;
+    const LightSampler& lights = scene_.lights();
+    for (std::size_t i = 0; i < lights.count(); ++i) {
+        if (!lights.can_be_hit(i)) continue;
+        const auto hit = lights.hit(i, state.origin, state.direction, distance);
+        if (!hit) continue;
+        float weight = 1.0f;
+        if (state.pdf > 0) {
+            weight =
+                balance(state.pdf, lights.pdf(i, state.receiver, state.direction, hit->distance));
+        }
+        sink.add(state, state.layer, state.throughput * hit->radiance * weight, state.views);
+    }
+}
+
+void PathTracer::add_environment(const State& state, Sink& sink) const {
+    const LightSampler& lights = scene_.lights();
+    Rgb radiance =
+        options_.direct_light_only && state.has_receiver ? Rgb(Rgb::Zero()) : lights.ambient();
+    if (!state.is_covered) {
+        for (const std::size_t i : lights.environments()) {
+            float weight = 1.0f;
+            if (state.pdf > 0) {
+                weight = balance(state.pdf, lights.pdf(i, state.receiver, state.direction, 1e30f));
+            }
+            radiance += lights.environment_radiance(i, state.direction) * weight;
+        }
+    }
+    // An environment seen from the first surface is direct light, whatever its layer says by now.
+    const Layer layer = state.is_from_first && !state.is_layer_fixed ? Layer::Shadow : state.layer;
+    sink.add(state, layer, state.throughput * radiance, state.views);
+}
+
+void PathTracer::find_free(std::span<Ray> rays, std::uint32_t views, std::uint32_t* free) const {
+    const auto clear = [&](std::uint32_t mask, std::uint32_t its_views) {
+        for (Ray& ray : rays) ray.mask = mask;
+        if (rays.size() == 1) {
+            if (!free[0] && !scene_.is_occluded(rays.front())) free[0] = its_views;
+            return;
+        }
+        std::vector<std::uint8_t> hidden;
+        scene_.occluded(rays, hidden);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            if (!free[i] && !hidden[i]) free[i] = its_views;
+        }
+    };
+    std::fill(free, free + rays.size(), 0u);
+    clear(mask_of(views), views);
+    if (views != kAllParts) return;
+    // What a virtual part hides may lie open in the scene without.
+    if (std::find(free, free + rays.size(), 0u) != free + rays.size()) {
+        clear(kRealParts, kRealParts);
+    }
+}
+
+void PathTracer::add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                            const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
+                            int light_samples, Sink& sink) const {
+    const LightSampler& lights = scene_.lights();
+    if (lights.count() == 0) return;
+    // All lights at the surface seen; one of them, by turns of chance, at those behind it.
+    const bool takes_all = state.is_first_receiver || lights.count() == 1;
+    std::size_t begin = 0, end = lights.count();
+    float boost = 1.0f;
+    if (!takes_all) {
+        const float u = sampler.number(state.depth, kPickUse);
+        begin = std::min(lights.count() - 1,
+                         static_cast<std::size_t>(u * static_cast<float>(lights.count())));
+        end = begin + 1;
+        boost = static_cast<float>(lights.count());
+    }
+    const Vec3f origin = scene_.leave_smooth(point);
+    for (std::size_t i = begin; i < end; ++i) {
+        const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
+        const int count = lights.needs_position(i) ? light_samples : 1;
+        const float scale = boost / static_cast<float>(count);
+        for (int begin_k = 0; begin_k < count; begin_k += static_cast<int>(kPacket)) {
+            std::array<Ray, kPacket> rays;
+            std::array<Rgb, kPacket> light;
+            std::array<std::uint32_t, kPacket> lit;
+            std::size_t found = 0;
+            for (int k = begin_k; k < std::min(count, begin_k + static_cast<int>(kPacket)); ++k) {
+                Vec2f u(0.5f, 0.5f);
+                if (lights.needs_position(i)) u = sampler.pair(state.depth, use, count, k);
+                const auto s = lights.sample(i, origin, u);
+                if (!s) continue;
+                const Vec3f wi = frame.to_local(s->direction);
+                if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
+                const Rgb value = direct_value(state, bsdf, wo, wi, s->pdf);
+                if (!(value > 0).any()) continue;
+                rays[found] = {origin, s->direction, 0.0f, s->distance * (1 - 1e-4f)};
+                light[found++] = state.throughput * value * s->radiance_over_pdf * (scale * wi.z());
+            }
+            if (found == 0) continue;
+            find_free(std::span(rays).first(found), state.views, lit.data());
+            for (std::size_t k = 0; k < found; ++k) {
+                if (lit[k] != 0) sink.add_in(lit[k], state, state.layer, light[k]);
+            }
+        }
+    }
+}
+
+Rgb PathTracer::direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
+                             float light_pdf) const {
+    Rgb value = Rgb::Zero();
+    const bool can_scatter =
+        !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces;
+    for (const Lobe lobe : {Lobe::Diffuse, Lobe::Glossy}) {
+        // Light that a glossy lobe sends on to an earlier receiver is among its photons.
+        if (lobe == Lobe::Glossy && caustics_ && state.has_receiver) continue;
+        const float probability = lobe_probability(bsdf, lobe);
+        if (probability <= 0) continue;
+        float weight = 1.0f;
+        if (light_pdf > 0 && can_scatter) {
+            weight = balance(light_pdf, probability * pdf_lobe(bsdf, lobe, wo, wi));
+        }
+        value += weight * eval_lobe(bsdf, lobe, wo, wi);
+    }
+    return value;
+}
+
+void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                              const Frame& frame, const Vec3f& wo, Sink& sink) const {
+    if (!caustics_ || caustics_->empty()) return;
+    if (state.is_diffuse_segment && (point.position - state.receiver).norm() >= caustics_->near_m) {
+        return;  // known from the secondary lights
+    }
+    const bool is_translucent = std::holds_alternative<TranslucentBsdf>(bsdf);
+    const bool has_glossy = !state.has_receiver && lobe_probability(bsdf, Lobe::Glossy) > 0;
+    struct Sums {
+        Rgb irradiance = Rgb::Zero(), glossy = Rgb::Zero();
+    };
+    const std::uint32_t first_view = state.views & kVirtualParts ? kVirtualParts : kRealParts;
+    Sums first, without;  // the second of a path of both scenes
+    bool is_different = false;
+    const auto visit = [&](const Photon& photon, float kernel) {
+        if (!(photon.views & state.views)) return;
+        Sums sums;
+        if (!is_translucent) sums.irradiance = kernel * photon.power;
+        if (has_glossy || is_translucent) {
+            const Vec3f wi = frame.to_local(photon.to_light.unpack());
+            if (is_translucent) {  // what enters depends on the direction
+                sums.glossy = kernel * photon.power * eval_lobe(bsdf, Lobe::Diffuse, wo, wi);
+            }
+            if (has_glossy) {
+                sums.glossy += kernel * photon.power * eval_lobe(bsdf, Lobe::Glossy, wo, wi);
+            }
+        }
+        const auto add_to = [&](Sums& total) {
+            total.irradiance += sums.irradiance;
+            total.glossy += sums.glossy;
+        };
+        if (photon.views & first_view) add_to(first);
+        if (state.views != kAllParts) return;
+        if (photon.views & kRealParts) add_to(without);
+        is_different |= photon.views != kAllParts;
+    };
+    if (state.has_receiver) {
+        const PhotonGrid& map = state.is_diffuse_segment ? caustics_->wide : caustics_->broad;
+        map.gather(point.position, point.geometric_normal, visit);
+    } else {
+        caustics_->sharp.gather(point.position, point.geometric_normal, visit);
+        caustics_->soft.gather(point.position, point.geometric_normal, visit);
+    }
+    const Rgb value = eval_lobe(bsdf, Lobe::Diffuse, wo, Vec3f(0, 0, 1));
+    const Layer layer = state.is_layer_fixed      ? state.layer
+                        : state.is_first_receiver ? Layer::Caustics
+                                                  : Layer::Diffuse;
+    const auto reflected = [&](const Sums& sums) -> Rgb {
+        return state.throughput * (sums.irradiance * value + sums.glossy);
+    };
+    if (!is_different) {
+        sink.add(state, layer, reflected(first), state.views);
+        return;
+    }
+    sink.add_in(kVirtualParts, state, layer, reflected(first));
+    sink.add_in(kRealParts, state, layer, reflected(without));
+}
+
+void PathTracer::add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                              const Vec3f& wo, Sink& sink) const {
+    const auto* face = std::get_if<TranslucentBsdf>(&bsdf);
+    if (!face || !translucent_) return;
+    const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
+    const Rgb share =
+        state.throughput * Rgb::Constant(fresnel_transmittance(wo.z(), face->eta) / kPif);
+    const auto exitance = [&](std::uint32_t views) -> Rgb {
+        return share * translucent_->exitance(scene_, point, mask_of(views));
+    };
+    if (state.views != kAllParts || !translucent_->is_touched(point.part)) {
+        sink.add(state, layer, exitance(state.views), state.views);
+        return;
+    }
+    sink.add_in(kVirtualParts, state, layer, exitance(kVirtualParts));
+    sink.add_in(kRealParts, state, layer, exitance(kRealParts));
+}
+
+void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                               const PathSampler& sampler, Sink& sink) const {
+    if (!caustics_ || caustics_->secondary_choice.empty()) return;
+    float u = sampler.number(state.depth, kSecondaryUse);
+    const std::size_t index = caustics_->secondary_choice.sample(u);
+    const SecondaryLight& light = caustics_->secondary[index];
+    const std::uint32_t views = light.views & state.views;
+    if (views == 0) return;
+    const Vec3f origin = scene_.leave_smooth(point);
+    const Vec3f to_light = light.position + scene_.epsilon() * light.normal - origin;
+    const float distance = to_light.norm();
+    if (distance < caustics_->near_m) return;
+    const Vec3f direction = to_light / distance;
+    const float cos_here = direction.dot(point.shading_normal);
+    const float cos_there = -direction.dot(light.normal);
+    if (cos_here <= 0 || cos_there <= 0 || direction.dot(point.geometric_normal) <= 0) return;
+    const Rgb value = eval_lobe(bsdf, Lobe::Diffuse, Vec3f(0, 0, 1), Vec3f(0, 0, 1));
+    if (!(value > 0).any()) return;
+    Ray ray{origin, direction, 0.0f, distance * (1 - 1e-4f)};
+    std::uint32_t lit = 0;
+    find_free(std::span(&ray, 1), views, &lit);
+    if (lit == 0) return;
+    const auto probability = static_cast<float>(caustics_->secondary_choice.probability(index));
+    const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
+    const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
+    sink.add_in(lit, state, layer, state.throughput * value * light.flux * geometry);
+}
+
+}  // namespace vitrine
