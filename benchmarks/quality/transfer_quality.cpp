@@ -6,6 +6,7 @@
 #include "base/json_reader.h"
 #include "base/timer.h"
 #include "compose/transfer.h"
+#include "estimate/back_surface.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
@@ -144,9 +145,10 @@ std::vector<Rgb> true_light(const TruthPhoto& truth, const Relief& relief,
     even.from_below = truth.ground * kPi;
     std::vector<Rgb> result = entering_light(relief, points, even, eta, true);
     // The grey surroundings end where the table begins.
-    const SkyShares sky = sky_shares(relief, points);
+    const Occluder occluder(relief);
+    const SkyShares sky = sky_shares(occluder, points);
     for (const NearLamp& lamp : truth.lamps) {
-        const std::vector<float> seen = visibility(relief, points, lamp.direction);
+        const std::vector<float> seen = occluder.visibility(points, lamp.direction);
         for (std::size_t i = 0; i < result.size(); ++i) {
             const Vec3 way = lamp.position_px - points.position[i].cast<double>();
             const Vec3 w = way.normalized();
@@ -194,19 +196,17 @@ TruthPhoto read_truth(const fs::path& folder, const std::string& name) {
     const double centre_m = json.object("object").numbers("centre_camera_m", 3)[2];
     for (std::size_t i = 0; i < z.size(); ++i)
         truth.height_px[i] = static_cast<float>((-z[i] - centre_m) * truth.px_per_m);
-    // The middle surface, about which the unseen back mirrors the front: a membrane over the rim.
-    ImageRgb middle(z.width(), z.height());
-    for (std::size_t i = 0; i < z.size(); ++i) middle[i] = Rgb::Constant(z[i]);
-    relief.middle_px = ImageF(z.width(), z.height());
-    const Mask inner = erode(relief.mask, 2);
-    middle = harmonic_fill(extend_nearest(middle, relief.mask), inner);
     for (std::size_t i = 0; i < z.size(); ++i) {
         if (relief.mask[i] <= 127) continue;
-        relief.middle_px[i] = static_cast<float>((-middle[i][0] - centre_m) * truth.px_per_m);
-        relief.depth_px[i] = std::max(truth.height_px[i], relief.middle_px[i] + 0.5f);
+        relief.depth_px[i] = truth.height_px[i];
         const Vec3f n(normal[i][0], normal[i][1], normal[i][2]);
         if (n.norm() > 0.5f) relief.normals[i] = n.normalized();
     }
+    // Nothing is known of the unseen back: as thick as the silhouette inflated, at most.
+    ReliefOptions dome;
+    dome.alpha = 0;
+    relief =
+        with_thickness(relief, thickness_of(shade_to_shape(truth.photo.linear, relief.mask, dome)));
     const JsonObject camera = json.object("camera");
     for (const JsonObject& light : json.objects("lights")) {
         NearLamp lamp;
@@ -237,6 +237,14 @@ void dump_relief(const fs::path& path, const Relief& relief) {
     ImageRgb picture(relief.mask.width(), relief.mask.height());
     for (std::size_t i = 0; i < picture.size(); ++i)
         if (relief.mask[i] > 127) picture[i] = (0.5f * relief.normals[i].array() + 0.5f).pow(2.2f);
+    dump_encoded(path, picture);
+}
+
+void dump_thickness(const fs::path& path, const Relief& relief) {
+    ImageRgb picture(relief.mask.width(), relief.mask.height());
+    const ImageF thickness = thickness_of(relief);
+    for (std::size_t i = 0; i < picture.size(); ++i)
+        picture[i] = Rgb::Constant(thickness[i] / static_cast<float>(2 * relief.inradius_px));
     dump_encoded(path, picture);
 }
 
@@ -349,12 +357,12 @@ int main(int argc, char** argv) {
         const Relief true_relief = material.analysis.relief.is_cluster()
                                        ? true_cluster(truth, material.analysis.relief)
                                        : truth.relief;
-        const EnteringLight light = [&](const SurfacePoints& points, double eta) {
-            return true_light(truth, true_relief, points, eta);
-        };
-        const MediumEstimate known =
-            estimate_bssrdf(material.analysis.highlights.diffuse, true_relief,
-                            material.analysis.highlights.grown, light, options.bssrdf);
+        const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points,
+                                        double eta) { return true_light(truth, lit, points, eta); };
+        const BodyEstimate known_body =
+            estimate_body(true_relief, material.analysis.highlights.diffuse,
+                          material.analysis.highlights.grown, light, options.bssrdf);
+        const MediumEstimate& known = known_body.medium;
         fmt::print("  {}, residuals {:.3f} {:.3f} {:.3f}\n",
                    known.is_fresnel ? "Fresnel" : "no Fresnel", known.channels[0].relative_residual,
                    known.channels[1].relative_residual, known.channels[2].relative_residual);
@@ -368,6 +376,8 @@ int main(int argc, char** argv) {
             dump_encoded(dump / (name + "_self.png"), material.rendered);
             dump_relief(dump / (name + "_relief.png"), material.analysis.relief);
             dump_relief(dump / (name + "_true_relief.png"), truth.relief);
+            dump_thickness(dump / (name + "_thickness.png"), material.analysis.relief);
+            dump_thickness(dump / (name + "_thickness_known.png"), known_body.relief);
         }
         lifted.emplace(name, std::move(material));
         truths.emplace(name, truth);

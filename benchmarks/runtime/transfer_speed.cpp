@@ -88,8 +88,9 @@ void run_size(const Photo& source, const Photo& target, double megapixels) {
     RadialProfile profile;
     TransferLook look;
     print("first result", timed([&] {
-              material = lift_material(material_photo);
-              PhotoAnalysis object = analyse_object(object_photo);
+              AnalysedPair pair = analyse_pair(material_photo, object_photo);
+              material = std::move(pair.material);
+              PhotoAnalysis object = std::move(pair.object);
               const double ratio =
                   length_ratio(material.medium.inradius_px, object.relief.inradius_px, 0, 0);
               profile = material.medium.profile().scaled(ratio);

@@ -1,5 +1,6 @@
 #include "compose/transfer.h"
 
+#include "base/parallel.h"
 #include "compose/object_irradiance.h"
 #include "estimate/highlight_light.h"
 #include "estimate/relief_refinement.h"
@@ -11,6 +12,7 @@
 #include "render/translucent_shadow_map.h"
 
 #include <algorithm>
+#include <future>
 
 namespace vitrine {
 namespace {
@@ -100,11 +102,20 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
                              const Progress& progress) {
     LiftedMaterial lifted;
     lifted.analysis = analyse(photo, Role::Material, options, progress.part(0.0, 0.6));
-    const PhotoAnalysis& analysis = lifted.analysis;
+    PhotoAnalysis& analysis = lifted.analysis;
     const ImageRgb shown = scaled_image(analysis.highlights.diffuse, 1 / analysis.white);
-    lifted.medium =
-        estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, analysis.lights.lights,
-                        options.bssrdf, progress.part(0.6, 0.9));
+    const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points, double eta) {
+        return entering_light(lit, points, analysis.lights.lights, eta, options.bssrdf.use_shadows);
+    };
+    lifted.medium = estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, light,
+                                    options.bssrdf, progress.part(0.6, 0.8));
+    // R_d stays with the body for which the lights were found; another back would ask for others.
+    if (options.use_back) {
+        const std::optional<Relief> worn = refine_back(
+            analysis.relief, shown, analysis.highlights.grown, light, lifted.medium, options.back);
+        if (worn) analysis.relief = *worn;
+    }
+    progress.update(0.9, "thickness");
 
     lifted.brightness = limit_albedo(lifted.medium);
 
@@ -135,6 +146,15 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
 PhotoAnalysis analyse_object(const Photo& photo, const TransferAnalysisOptions& options,
                              const Progress& progress) {
     return analyse(photo, Role::Object, options, progress);
+}
+
+AnalysedPair analyse_pair(const Photo& material_photo, const Photo& object_photo,
+                          const TransferAnalysisOptions& options, const Progress& progress) {
+    const auto policy = thread_count() > 1 ? std::launch::async : std::launch::deferred;
+    std::future<PhotoAnalysis> object =
+        std::async(policy, [&] { return analyse_object(object_photo, options); });
+    LiftedMaterial material = lift_material(material_photo, options, progress);
+    return {std::move(material), object.get()};
 }
 
 double length_ratio(double source_inradius_px, double target_inradius_px, double source_px_per_m,

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "capture/photo.h"
+#include "estimate/back_surface.h"
 #include "estimate/bssrdf.h"
 #include "estimate/highlights.h"
 #include "estimate/lopez_moreno.h"
@@ -49,6 +50,8 @@ struct TransferAnalysisOptions {
     BallOptions balls;
     /// Of a material photo's one body: shape by the lights found, then lights again, so often.
     int refinement_rounds = 2;
+    bool use_back = true;  ///< of the same: how thick it is where light shines through
+    BackSurfaceOptions back;
     LightMethod light_method = LightMethod::Diffusion;
     /// How firmly the roles are believed: 1, the material photo is soft because of its material
     /// and the object photo because of its light; 0.5, no opinion.
@@ -83,6 +86,16 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
 
 PhotoAnalysis analyse_object(const Photo& photo, const TransferAnalysisOptions& options = {},
                              const Progress& progress = {});
+
+struct AnalysedPair {
+    LiftedMaterial material;
+    PhotoAnalysis object;
+};
+/// Both at once, which fills the cores better than one after the other. `progress` tells of the
+/// material photo, the longer part.
+AnalysedPair analyse_pair(const Photo& material_photo, const Photo& object_photo,
+                          const TransferAnalysisOptions& options = {},
+                          const Progress& progress = {});
 
 struct TransferLook {
     double scale = 1;     ///< factor on the material's lengths: more is more translucent

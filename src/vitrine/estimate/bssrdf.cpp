@@ -134,11 +134,11 @@ MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const M
     }
     const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
     Eigen::MatrixXf source =
-        as_matrix(light({samples.position, samples.normal, samples.ball}, surface_eta));
+        as_matrix(light(relief, {samples.position, samples.normal, samples.ball}, surface_eta));
     for (Index i = 0; i < source.rows(); ++i)
         source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
-    const Eigen::MatrixXf local = as_matrix(
-        light({observations.position, observations.normal, observations.ball}, surface_eta));
+    const Eigen::MatrixXf local = as_matrix(light(
+        relief, {observations.position, observations.normal, observations.ball}, surface_eta));
 
     const ImageRgb smooth =
         smooth_inside(diffuse, relief.mask, excluded, options.smoothing * relief.inradius_px);
@@ -239,8 +239,8 @@ MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, co
 MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,
                                const ViewLights& lights, const BssrdfOptions& options,
                                const Progress& progress) {
-    const EnteringLight light = [&](const SurfacePoints& points, double eta) {
-        return entering_light(relief, points, lights, eta, options.use_shadows);
+    const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points, double eta) {
+        return entering_light(lit, points, lights, eta, options.use_shadows);
     };
     return estimate_bssrdf(diffuse, relief, excluded, light, options, progress);
 }

@@ -89,8 +89,9 @@ MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, co
                                const ViewLights& lights, const BssrdfOptions& options = {},
                                const Progress& progress = {});
 
-/// Irradiance that enters at points of the relief, through a surface of index eta (1: none).
-using EnteringLight = std::function<std::vector<Rgb>(const SurfacePoints& points, double eta)>;
+/// Irradiance that enters at points of a relief, through a surface of index eta (1: none).
+using EnteringLight =
+    std::function<std::vector<Rgb>(const Relief& relief, const SurfacePoints& points, double eta)>;
 
 /// The same under any light, near lamps and bounced light included.
 MediumEstimate estimate_bssrdf(const ImageRgb& diffuse, const Relief& relief, const Mask& excluded,

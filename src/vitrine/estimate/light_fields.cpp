@@ -8,13 +8,13 @@ using Eigen::Index;
 
 LitRelief::LitRelief(const Relief& relief, ReliefSamples samples, ReliefObservations observations,
                      double eta, bool use_shadows)
-    : relief_(relief),
+    : occluder_(relief),
       samples_(std::move(samples)),
       observations_(std::move(observations)),
       sample_points_{samples_.position, samples_.normal, samples_.ball},
       observation_points_{observations_.position, observations_.normal, observations_.ball},
-      sample_sky_(sky_shares(relief, sample_points_)),
-      observation_sky_(sky_shares(relief, observation_points_)),
+      sample_sky_(sky_shares(occluder_, sample_points_)),
+      observation_sky_(sky_shares(occluder_, observation_points_)),
       eta_(eta),
       use_shadows_(use_shadows) {}
 
@@ -26,7 +26,7 @@ void LitRelief::fill(Eigen::MatrixXf& field, const SurfacePoints& points,
     for (Index l = 0; l < count; ++l) {
         const Vec3& direction = directions[static_cast<std::size_t>(l)];
         std::vector<float> seen(points.position.size(), 1.0f);
-        if (use_shadows_) seen = visibility(relief_, points, direction);
+        if (use_shadows_) seen = occluder_.visibility(points, direction);
         for (Index i = 0; i < rows; ++i) {
             const auto k = static_cast<std::size_t>(i);
             field(i, l) = seen[k] * static_cast<float>(

@@ -31,7 +31,7 @@ class LitRelief {
     void fill(Eigen::MatrixXf& field, const SurfacePoints& points,
               const std::vector<Vec3>& directions, const SkyShares* sky) const;
 
-    const Relief& relief_;
+    Occluder occluder_;
     ReliefSamples samples_;
     ReliefObservations observations_;
     SurfacePoints sample_points_, observation_points_;

@@ -23,22 +23,31 @@ Image<T> blur(const Image<T>& image, double sigma, const T& zero) {
     if (sigma <= 0) return image;
     const std::vector<float> kernel = gaussian_kernel(sigma);
     const int radius = static_cast<int>(kernel.size() / 2);
-    Image<T> rows(image.width(), image.height()), result(image.width(), image.height());
-    const auto pass = [&](const Image<T>& from, Image<T>& to, int dx, int dy) {
-        parallel_for(static_cast<std::size_t>(image.height()), 16, [&](std::size_t row) {
-            const int y = static_cast<int>(row);
-            for (int x = 0; x < image.width(); ++x) {
-                T sum = zero;
-                for (int k = -radius; k <= radius; ++k) {
-                    sum += from.clamped(x + dx * k, y + dy * k) *
-                           kernel[static_cast<std::size_t>(k + radius)];
-                }
-                to(x, y) = sum;
-            }
-        });
-    };
-    pass(image, rows, 1, 0);
-    pass(rows, result, 0, 1);
+    const int width = image.width(), height = image.height();
+    if (image.size() == 0) return image;
+    Image<T> rows(width, height), result(width, height, zero);
+    parallel_for(static_cast<std::size_t>(height), 16, [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        // Borders repeated once, so that the inner loop asks no questions.
+        std::vector<T> padded(static_cast<std::size_t>(width + 2 * radius), zero);
+        for (int x = -radius; x < width + radius; ++x)
+            padded[static_cast<std::size_t>(x + radius)] = image.clamped(x, y);
+        for (int x = 0; x < width; ++x) {
+            T sum = zero;
+            for (std::size_t k = 0; k < kernel.size(); ++k)
+                sum += padded[static_cast<std::size_t>(x) + k] * kernel[k];
+            rows(x, y) = sum;
+        }
+    });
+    parallel_for(static_cast<std::size_t>(height), 16, [&](std::size_t row) {
+        const int y = static_cast<int>(row);
+        T* const to = &result(0, y);
+        for (int k = -radius; k <= radius; ++k) {
+            const T* const from = &rows(0, std::clamp(y + k, 0, height - 1));
+            const float weight = kernel[static_cast<std::size_t>(k + radius)];
+            for (int x = 0; x < width; ++x) to[x] += from[x] * weight;
+        }
+    });
     return result;
 }
 

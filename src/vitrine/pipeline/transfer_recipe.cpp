@@ -34,21 +34,21 @@ double object_px_per_m(const Mask& mask, double object_size_m) {
     return std::max(x1 - x0 + 1, y1 - y0 + 1) / object_size_m;
 }
 
-ReadyMaterial ready_material(const TransferRequest& request, const Progress& progress) {
+ReadyMaterial stored_material(const TransferRequest& request) {
     ReadyMaterial ready;
-    if (!request.material.empty()) {
-        StoredMaterial stored = read_material_json(request.material);
-        ready.medium = std::move(stored.medium);
-        ready.px_per_m =
-            request.source_px_per_m > 0 ? request.source_px_per_m : stored.scale_px_per_m;
-        return ready;
-    }
-    const Photo photo = read_photo(request.source, request.source_options);
-    ready.lifted = lift_material(photo, request.analysis, progress);
-    ready.medium = ready.lifted->medium;
+    StoredMaterial stored = read_material_json(request.material);
+    ready.medium = std::move(stored.medium);
+    ready.px_per_m = request.source_px_per_m > 0 ? request.source_px_per_m : stored.scale_px_per_m;
+    return ready;
+}
+
+ReadyMaterial lifted_material(const TransferRequest& request, LiftedMaterial lifted) {
+    ReadyMaterial ready;
+    ready.medium = lifted.medium;
     ready.px_per_m = request.source_px_per_m;
     if (ready.px_per_m <= 0 && request.object_size_m > 0)
-        ready.px_per_m = object_px_per_m(photo.mask, request.object_size_m);
+        ready.px_per_m = object_px_per_m(lifted.analysis.photo.mask, request.object_size_m);
+    ready.lifted = std::move(lifted);
     return ready;
 }
 
@@ -100,6 +100,7 @@ void set_paper_method(TransferRequest& request) {
     request.analysis.bssrdf.transmittance = Transmittance::Fresnel;
     request.analysis.lights.use_curved_body = false;
     request.analysis.shape = ShapeModel::Inflated;
+    request.analysis.use_back = false;
     request.analysis.relief.alpha = 0.6;
     request.irradiance = IrradianceSource::Lights;
     request.look.highlights = HighlightTransfer::Phong;
@@ -112,10 +113,19 @@ TransferSummary run_transfer(const TransferRequest& request, const Progress& pro
     const Timer timer;
     TransferSummary summary;
     const Photo target_photo = read_photo(request.target, request.target_options);
-    const ReadyMaterial material = ready_material(request, progress.part(0.0, 0.5));
+    ReadyMaterial material;
+    PhotoAnalysis target;
+    if (!request.material.empty()) {
+        material = stored_material(request);
+        target = analyse_object(target_photo, request.analysis, progress.part(0.0, 0.8));
+    } else {
+        const Photo source_photo = read_photo(request.source, request.source_options);
+        AnalysedPair pair =
+            analyse_pair(source_photo, target_photo, request.analysis, progress.part(0.0, 0.8));
+        material = lifted_material(request, std::move(pair.material));
+        target = std::move(pair.object);
+    }
     collect(summary, material);
-    const PhotoAnalysis target =
-        analyse_object(target_photo, request.analysis, progress.part(0.5, 0.8));
     summary.is_uncertain |= target.lights.outcome == Outcome::NotIdentifiable;
     collect(summary, target.warnings);
 

@@ -57,31 +57,38 @@ std::vector<Vec3> fibonacci_directions(int count, double z_min) {
     return directions;
 }
 
-std::vector<float> visibility(const Relief& relief, const SurfacePoints& points,
-                              const Vec3& direction) {
+Occluder::Occluder(const Relief& relief) : relief_(relief) {
+    if (relief.is_cluster()) return;
+    for (int y = 0; y < relief.mask.height(); ++y) {
+        for (int x = 0; x < relief.mask.width(); ++x) {
+            if (!is_inside(relief.mask, x, y)) continue;
+            top_ =
+                std::max({top_, std::abs(relief.depth_px(x, y)), std::abs(relief.back_px(x, y))});
+        }
+    }
+}
+
+std::vector<float> Occluder::visibility(const SurfacePoints& points, const Vec3& direction) const {
     const Vec3f w = direction.cast<float>();
     std::vector<float> seen(points.position.size(), 1.0f);
-    float top = 0;  // beyond this height there is nothing
-    for (const float z : relief.depth_px) top = std::max(top, std::abs(z));
-    if (!relief.middle_px.empty()) top *= 3;
     parallel_for(points.position.size(), 256, [&](std::size_t i) {
         const bool is_hidden =
             points.normal[i].dot(w) <= 0 ||
-            (relief.is_cluster()
-                 ? is_hidden_by_balls(relief, static_cast<std::size_t>(points.ball[i]),
+            (relief_.is_cluster()
+                 ? is_hidden_by_balls(relief_, static_cast<std::size_t>(points.ball[i]),
                                       points.position[i], w)
-                 : is_hidden_by_relief(relief, top, points.position[i], points.normal[i], w));
+                 : is_hidden_by_relief(relief_, top_, points.position[i], points.normal[i], w));
         if (is_hidden) seen[i] = 0;
     });
     return seen;
 }
 
-SkyShares sky_shares(const Relief& relief, const SurfacePoints& points, int direction_count) {
+SkyShares sky_shares(const Occluder& occluder, const SurfacePoints& points, int direction_count) {
     const std::size_t count = points.position.size();
     std::vector<float> cosines(count, 0.0f), below(count, 0.0f);
     SkyShares shares{std::vector<float>(count, 0.0f), std::vector<float>(count, 0.0f)};
     for (const Vec3& direction : fibonacci_directions(direction_count, -1.0)) {
-        const std::vector<float> seen = visibility(relief, points, direction);
+        const std::vector<float> seen = occluder.visibility(points, direction);
         const Vec3f w = direction.cast<float>();
         for (std::size_t i = 0; i < count; ++i) {
             const float cosine = std::max(0.0f, points.normal[i].dot(w));
@@ -104,9 +111,10 @@ std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& point
                                 const ViewLights& lights, double eta, bool use_shadows) {
     const std::size_t count = points.position.size();
     std::vector<Rgb> result(count);
+    const Occluder occluder(relief);
     SkyShares sky;
     if (use_shadows) {
-        sky = sky_shares(relief, points);
+        sky = sky_shares(occluder, points);
     } else {
         sky.ambient.assign(count, 1.0f);
         for (const Vec3f& normal : points.normal) sky.below.push_back(facing_down(normal));
@@ -117,7 +125,7 @@ std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& point
     }
     for (const ViewLight& light : lights.lights) {
         std::vector<float> seen(count, 1.0f);
-        if (use_shadows) seen = visibility(relief, points, light.direction);
+        if (use_shadows) seen = occluder.visibility(points, light.direction);
         for (std::size_t i = 0; i < count; ++i) {
             const double e = entering_irradiance(points.normal[i], light.direction, eta) * seen[i];
             result[i] += (light.intensity * e).cast<float>();

@@ -13,17 +13,27 @@ struct SurfacePoints {
     std::span<const std::int16_t> ball;  ///< of a cluster; empty for one body
 };
 
-/// 1 where a point sees the light, 0 where the object itself is in the way: the mirrored relief,
-/// marched through, or the other balls of a cluster, exactly. O(points).
-std::vector<float> visibility(const Relief& relief, const SurfacePoints& points,
-                              const Vec3& direction);
+/// The object as what stands in the light's way: the mirrored relief, marched through, or the balls
+/// of a cluster, exactly. Keep one for many directions: making it costs O(pixels).
+class Occluder {
+  public:
+    explicit Occluder(const Relief& relief);  ///< keeps a reference
+
+    /// 1 where a point sees the light, 0 where the object itself is in the way. O(points).
+    std::vector<float> visibility(const SurfacePoints& points, const Vec3& direction) const;
+
+  private:
+    const Relief& relief_;
+    float top_ = 0;  ///< beyond this height there is nothing
+};
 
 /// How much of even light from everywhere, and from below, a point receives: cosine weighted, 1 and
 /// facing_down(n) where nothing of the object hides it.
 struct SkyShares {
     std::vector<float> ambient, below;
 };
-SkyShares sky_shares(const Relief& relief, const SurfacePoints& points, int direction_count = 40);
+SkyShares sky_shares(const Occluder& occluder, const SurfacePoints& points,
+                     int direction_count = 40);
 
 /// Irradiance that enters at the points. `use_shadows` false: as if nothing were in the way.
 std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,

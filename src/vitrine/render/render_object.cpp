@@ -123,7 +123,8 @@ ReliefIrradiance irradiance_with_shadows(const Relief& relief, const ViewLights&
     constexpr int kShadowCells = 2500;
     const ReliefSamples samples = sample_relief(relief, kShadowCells);
     const SurfacePoints points{samples.position, samples.normal, samples.ball};
-    const SkyShares sky = sky_shares(relief, points);
+    const Occluder occluder(relief);
+    const SkyShares sky = sky_shares(occluder, points);
     ReliefIrradiance result{ImageRgb(relief.mask.width(), relief.mask.height()),
                             ImageRgb(relief.mask.width(), relief.mask.height())};
     for (const bool is_front : {true, false}) {
@@ -132,13 +133,12 @@ ReliefIrradiance irradiance_with_shadows(const Relief& relief, const ViewLights&
         const LatticeField ambient(samples, sky.ambient, begin), below(samples, sky.below, begin);
         std::vector<LatticeField> seen;
         for (const ViewLight& light : lights.lights)
-            seen.emplace_back(samples, visibility(relief, points, light.direction), begin);
+            seen.emplace_back(samples, occluder.visibility(points, light.direction), begin);
         parallel_for(static_cast<std::size_t>(side.height()), 8, [&](std::size_t row) {
             const int y = static_cast<int>(row);
             for (int x = 0; x < side.width(); ++x) {
                 if (!is_inside(relief.mask, x, y)) continue;
-                Vec3f n = relief.normals(x, y);
-                if (!is_front) n.z() = -n.z();
+                const Vec3f n = is_front ? relief.normals(x, y) : relief.back_normal(x, y);
                 Rgbd sum = lights.ambient * ambient(x, y) + lights.from_below * below(x, y);
                 for (std::size_t l = 0; l < seen.size(); ++l) {
                     const ViewLight& light = lights.lights[l];

@@ -10,11 +10,35 @@
 namespace vitrine {
 namespace {
 
-struct Sources {
+/// Points that send light: samples, or blocks of them.
+struct Emitters {
     std::vector<float> x, y, z;
     std::vector<float> normal_x, normal_y, normal_z;
-    std::vector<Eigen::Array4f> power;  ///< sum of E dA per cell
+    std::vector<Eigen::Array4f> power;  ///< sum of E dA
+
+    std::size_t size() const { return x.size(); }
+    void add(const Vec3f& position, const Vec3f& normal, const Eigen::Array4f& sum) {
+        x.push_back(position.x());
+        y.push_back(position.y());
+        z.push_back(position.z());
+        normal_x.push_back(normal.x());
+        normal_y.push_back(normal.y());
+        normal_z.push_back(normal.z());
+        power.push_back(sum);
+    }
 };
+
+/// The samples in the order of their blocks, and the blocks, which stand for their samples from
+/// afar (Jensen and Buhler 2002, with one level).
+struct Sources {
+    Emitters samples, blocks;
+    std::vector<std::size_t> begin;  ///< of each block's samples; one more at the end
+    std::vector<float> far_squared;  ///< from where on a block stands for its samples
+};
+
+/// Cells along a block, and from how many of its radii on it will do.
+constexpr int kBlockCells = 4;
+constexpr float kFarRadii = 6;
 
 /// Nearer than this many cells the kernel is capped on the lattice.
 constexpr double kCapCells = 1.5;
@@ -27,6 +51,7 @@ constexpr float kSmallestSquare = 0.01f;
 /// C(s) of optics/curved_body for three channels; all zero: as if flat.
 struct BodyFactors {
     Eigen::Array4f linear = Eigen::Array4f::Zero(), quadratic = Eigen::Array4f::Zero();
+    Eigen::Array4f operator()(float rise) const { return 1 + rise * (linear + rise * quadratic); }
 };
 
 BodyFactors body_factors(const RadialProfile& profile, const TranslucentRenderOptions& options) {
@@ -41,27 +66,57 @@ BodyFactors body_factors(const RadialProfile& profile, const TranslucentRenderOp
     return factors;
 }
 
-/// sum_i R(|p - y_i|) C(rise) power_i
-Eigen::Array4f gather_at(const Vec3f& p, const Vec3f& normal, const Sources& sources,
-                         const KernelTable& table, const BodyFactors& body, float q_max) {
+/// What a receiver needs to know of emitters [begin, begin + count): squared distance, chord rise.
+void distances(const Vec3f& p, const Vec3f& normal, const Emitters& from, std::size_t begin,
+               std::size_t count, float q_max, float* q, float* rise) {
+    for (std::size_t k = 0; k < count; ++k) {
+        const float dx = from.x[begin + k] - p.x();
+        const float dy = from.y[begin + k] - p.y();
+        const float dz = from.z[begin + k] - p.z();
+        q[k] = std::min(dx * dx + dy * dy + dz * dz + kSmallestSquare, q_max);
+        const float along = dx * (from.normal_x[begin + k] - normal.x()) +
+                            dy * (from.normal_y[begin + k] - normal.y()) +
+                            dz * (from.normal_z[begin + k] - normal.z());
+        rise[k] = std::min(std::max(0.0f, 0.5f * along / std::sqrt(q[k])), 1.0f);
+    }
+}
+
+/// sum_i R(|p - y_i|) C(rise) power_i over all samples, one by one.
+Eigen::Array4f gather_all(const Vec3f& p, const Vec3f& normal, const Emitters& samples,
+                          const KernelTable& table, const BodyFactors& body, float q_max) {
     constexpr std::size_t kChunk = 256;
     float q[kChunk], rise[kChunk];
     Eigen::Array4f total = Eigen::Array4f::Zero();
-    for (std::size_t begin = 0; begin < sources.x.size(); begin += kChunk) {
-        const std::size_t count = std::min(kChunk, sources.x.size() - begin);
-        for (std::size_t k = 0; k < count; ++k) {
-            const float dx = sources.x[begin + k] - p.x();
-            const float dy = sources.y[begin + k] - p.y();
-            const float dz = sources.z[begin + k] - p.z();
-            q[k] = std::min(dx * dx + dy * dy + dz * dz + kSmallestSquare, q_max);
-            const float along = dx * (sources.normal_x[begin + k] - normal.x()) +
-                                dy * (sources.normal_y[begin + k] - normal.y()) +
-                                dz * (sources.normal_z[begin + k] - normal.z());
-            rise[k] = std::min(std::max(0.0f, 0.5f * along / std::sqrt(q[k])), 1.0f);
-        }
-        for (std::size_t k = 0; k < count; ++k) {
-            total += table(q[k]) * sources.power[begin + k] *
-                     (1 + rise[k] * (body.linear + rise[k] * body.quadratic));
+    for (std::size_t begin = 0; begin < samples.size(); begin += kChunk) {
+        const std::size_t count = std::min(kChunk, samples.size() - begin);
+        distances(p, normal, samples, begin, count, q_max, q, rise);
+        for (std::size_t k = 0; k < count; ++k)
+            total += table(q[k]) * samples.power[begin + k] * body(rise[k]);
+    }
+    return total;
+}
+
+/// The same, far blocks as one.
+Eigen::Array4f gather_at(const Vec3f& p, const Vec3f& normal, const Sources& sources,
+                         const KernelTable& table, const BodyFactors& body, float q_max) {
+    constexpr std::size_t kChunk = 128;
+    constexpr std::size_t kBlock = kBlockCells * kBlockCells;
+    float block_q[kChunk], block_rise[kChunk], q[kBlock], rise[kBlock];
+    Eigen::Array4f total = Eigen::Array4f::Zero();
+    for (std::size_t first = 0; first < sources.blocks.size(); first += kChunk) {
+        const std::size_t blocks = std::min(kChunk, sources.blocks.size() - first);
+        distances(p, normal, sources.blocks, first, blocks, q_max, block_q, block_rise);
+        for (std::size_t j = 0; j < blocks; ++j) {
+            const std::size_t block = first + j;
+            if (block_q[j] > sources.far_squared[block]) {
+                total += table(block_q[j]) * sources.blocks.power[block] * body(block_rise[j]);
+                continue;
+            }
+            const std::size_t begin = sources.begin[block];
+            const std::size_t count = sources.begin[block + 1] - begin;
+            distances(p, normal, sources.samples, begin, count, q_max, q, rise);
+            for (std::size_t k = 0; k < count; ++k)
+                total += table(q[k]) * sources.samples.power[begin + k] * body(rise[k]);
         }
     }
     return total;
@@ -98,37 +153,48 @@ Rgb bicubic(const ImageRgb& lattice, double x, double y) {
     return sum;
 }
 
-/// Gaussian over the inside of the mask only.
+/// Gaussian over the inside of the mask only; 0 outside.
 ImageRgb masked_blur(const ImageRgb& image, const Mask& mask, double sigma) {
     if (sigma < 0.3) return image;
-    ImageRgb weighted(image.width(), image.height());
-    ImageF weight(image.width(), image.height());
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-        if (mask[i] <= 127) continue;
-        weighted[i] = image[i];
-        weight[i] = 1;
+    // The object's box is often a small part of the picture.
+    int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
+    for (int y = 0; y < mask.height(); ++y) {
+        for (int x = 0; x < mask.width(); ++x) {
+            if (!is_inside(mask, x, y)) continue;
+            x0 = std::min(x0, x);
+            x1 = std::max(x1, x);
+            y0 = std::min(y0, y);
+            y1 = std::max(y1, y);
+        }
+    }
+    ImageRgb result(mask.width(), mask.height());
+    if (x1 < x0) return result;
+    // A rim of zeros, which blur() repeats: nothing comes in from outside the mask.
+    ImageRgb weighted(x1 - x0 + 3, y1 - y0 + 3);
+    ImageF weight(weighted.width(), weighted.height());
+    for (int y = y0; y <= y1; ++y) {
+        for (int x = x0; x <= x1; ++x) {
+            if (!is_inside(mask, x, y)) continue;
+            weighted(x - x0 + 1, y - y0 + 1) = image(x, y);
+            weight(x - x0 + 1, y - y0 + 1) = 1;
+        }
     }
     weighted = gaussian_blur(weighted, sigma);
     weight = gaussian_blur(weight, sigma);
-    for (std::size_t i = 0; i < mask.size(); ++i)
-        weighted[i] = mask[i] > 127 ? (weighted[i] / std::max(weight[i], 1e-6f)).eval() : image[i];
-    return weighted;
+    for (int y = y0; y <= y1; ++y) {
+        for (int x = x0; x <= x1; ++x) {
+            if (!is_inside(mask, x, y)) continue;
+            result(x, y) =
+                weighted(x - x0 + 1, y - y0 + 1) / std::max(weight(x - x0 + 1, y - y0 + 1), 1e-6f);
+        }
+    }
+    return result;
 }
 
-Sources sources_from(const ReliefSamples& samples, const Relief& relief,
-                     const ReliefIrradiance& irradiance) {
-    Sources sources;
-    for (const Vec3f& p : samples.position) {
-        sources.x.push_back(p.x());
-        sources.y.push_back(p.y());
-        sources.z.push_back(p.z());
-    }
-    for (const Vec3f& n : samples.normal) {
-        sources.normal_x.push_back(n.x());
-        sources.normal_y.push_back(n.y());
-        sources.normal_z.push_back(n.z());
-    }
-    sources.power.assign(samples.position.size(), Eigen::Array4f::Zero());
+/// Light that enters at each sample.
+std::vector<Eigen::Array4f> sample_powers(const ReliefSamples& samples, const Relief& relief,
+                                          const ReliefIrradiance& irradiance) {
+    std::vector<Eigen::Array4f> power(samples.position.size(), Eigen::Array4f::Zero());
     const double step = samples.step_px;
     for (int y = 0; y < relief.mask.height(); ++y) {
         for (int x = 0; x < relief.mask.width(); ++x) {
@@ -137,8 +203,64 @@ Sources sources_from(const ReliefSamples& samples, const Relief& relief,
             const int cy = static_cast<int>((y - samples.origin_y) / step);
             const auto k = static_cast<std::size_t>(samples.cell(cx, cy));
             const float area = 1 / std::max(relief.normals(x, y).z(), kMinAreaCos);
-            sources.power[k] += widen(irradiance.front(x, y)) * area;
-            sources.power[k + samples.front_count] += widen(irradiance.back(x, y)) * area;
+            power[k] += widen(irradiance.front(x, y)) * area;
+            power[k + samples.front_count] += widen(irradiance.back(x, y)) * area;
+        }
+    }
+    return power;
+}
+
+Emitters all_samples(const ReliefSamples& samples, const std::vector<Eigen::Array4f>& power) {
+    Emitters all;
+    for (std::size_t k = 0; k < power.size(); ++k)
+        all.add(samples.position[k], samples.normal[k], power[k]);
+    return all;
+}
+
+/// Closes the block whose samples are the last ones of `sources.samples`.
+void add_block(Sources& sources) {
+    const Emitters& all = sources.samples;
+    const std::size_t begin = sources.begin.back();
+    if (all.size() == begin) return;
+    Vec3f centre = Vec3f::Zero(), normal = Vec3f::Zero();
+    Eigen::Array4f power = Eigen::Array4f::Zero();
+    float weights = 0;
+    const auto at = [&](std::size_t k) { return Vec3f(all.x[k], all.y[k], all.z[k]); };
+    for (std::size_t k = begin; k < all.size(); ++k) {
+        const float weight = all.power[k].sum() + 1e-20f;
+        centre += weight * at(k);
+        normal += weight * Vec3f(all.normal_x[k], all.normal_y[k], all.normal_z[k]);
+        power += all.power[k];
+        weights += weight;
+    }
+    centre /= weights;
+    float radius_squared = 0;
+    for (std::size_t k = begin; k < all.size(); ++k)
+        radius_squared = std::max(radius_squared, (at(k) - centre).squaredNorm());
+    sources.blocks.add(centre, normal.normalized(), power);
+    sources.far_squared.push_back(kFarRadii * kFarRadii * radius_squared);
+    sources.begin.push_back(all.size());
+}
+
+Sources sources_from(const ReliefSamples& samples, const Relief& relief,
+                     const ReliefIrradiance& irradiance) {
+    const std::vector<Eigen::Array4f> power = sample_powers(samples, relief, irradiance);
+    Sources sources;
+    sources.begin.push_back(0);
+    for (const std::size_t side : {std::size_t{0}, samples.front_count}) {
+        for (int by = 0; by < samples.cell.height(); by += kBlockCells) {
+            for (int bx = 0; bx < samples.cell.width(); bx += kBlockCells) {
+                for (int j = 0; j < kBlockCells; ++j) {
+                    for (int i = 0; i < kBlockCells; ++i) {
+                        if (!samples.cell.contains(bx + i, by + j)) continue;
+                        const std::int32_t cell = samples.cell(bx + i, by + j);
+                        if (cell < 0) continue;
+                        const std::size_t k = side + static_cast<std::size_t>(cell);
+                        sources.samples.add(samples.position[k], samples.normal[k], power[k]);
+                    }
+                }
+                add_block(sources);
+            }
         }
     }
     return sources;
@@ -201,7 +323,7 @@ ImageRgb render_translucent_brute_force(const Relief& relief, const ReliefIrradi
                                         const RadialProfile& profile,
                                         const TranslucentRenderOptions& options, int stride) {
     const ReliefSamples samples = sample_relief(relief, relief.mask.width() * relief.mask.height());
-    const Sources sources = sources_from(samples, relief, irradiance);
+    const Emitters all = all_samples(samples, sample_powers(samples, relief, irradiance));
     const SplitKernel split = split_kernel(profile, kCapCells);
     const float q_max = largest_squared_distance(samples);
     const KernelTable table(split.far, kSmallestSquare, q_max);
@@ -214,7 +336,7 @@ ImageRgb render_translucent_brute_force(const Relief& relief, const ReliefIrradi
             for (int x = 0; x < result.width(); x += stride) {
                 if (!is_inside(relief.mask, x, y)) continue;
                 const Rgb far =
-                    gather_at(relief.point(x, y), relief.normals(x, y), sources, table, body, q_max)
+                    gather_all(relief.point(x, y), relief.normals(x, y), all, table, body, q_max)
                         .head<3>();
                 result(x, y) = (far + near_share * irradiance.front(x, y)) *
                                static_cast<float>(

@@ -65,7 +65,7 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
     samples.cell = Image<std::int32_t>(columns, rows, -1);
 
     struct Sum {
-        Vec3 position = Vec3::Zero(), normal = Vec3::Zero();
+        Vec3 position = Vec3::Zero(), normal = Vec3::Zero(), back_normal = Vec3::Zero();
         double back = 0;
         double area = 0, count = 0;
     };
@@ -81,14 +81,17 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
             sum.position += relief.point(x, y).cast<double>();
             sum.back += relief.back_px(x, y);
             sum.normal += n.cast<double>() * area;
+            sum.back_normal += relief.back_normal(x, y).cast<double>() * area;
             sum.area += area;
             sum.count += 1;
         }
     }
     std::vector<float> back;
+    std::vector<Vec3f> back_normal;
     for (std::size_t k = 0; k < sums.size(); ++k) {
         if (sums[k].count == 0) continue;
         back.push_back(static_cast<float>(sums[k].back / sums[k].count));
+        back_normal.push_back(sums[k].back_normal.normalized().cast<float>());
         samples.cell[k] = static_cast<std::int32_t>(samples.position.size());
         samples.position.push_back((sums[k].position / sums[k].count).cast<float>());
         samples.normal.push_back(sums[k].normal.normalized().cast<float>());
@@ -96,9 +99,9 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
     }
     samples.front_count = samples.position.size();
     for (std::size_t k = 0; k < samples.front_count; ++k) {
-        const Vec3f p = samples.position[k], n = samples.normal[k];
+        const Vec3f p = samples.position[k];
         samples.position.push_back({p.x(), p.y(), back[k]});
-        samples.normal.push_back({n.x(), n.y(), -n.z()});
+        samples.normal.push_back(back_normal[k]);
         samples.area_px2.push_back(samples.area_px2[k]);
     }
     return samples;
@@ -112,13 +115,12 @@ ReliefIrradiance irradiance_from_lights(const Relief& relief, const ViewLights& 
         const int y = static_cast<int>(row);
         for (int x = 0; x < relief.mask.width(); ++x) {
             if (!is_inside(relief.mask, x, y)) continue;
-            const Vec3f n = relief.normals(x, y);
+            const Vec3f n = relief.normals(x, y), n_back = relief.back_normal(x, y);
             Rgbd front = lights.ambient + lights.from_below * facing_down(n);
-            Rgbd back = front;
+            Rgbd back = lights.ambient + lights.from_below * facing_down(n_back);
             for (const ViewLight& light : lights.lights) {
                 front += light.intensity * entering_irradiance(n, light.direction, eta);
-                back += light.intensity *
-                        entering_irradiance({n.x(), n.y(), -n.z()}, light.direction, eta);
+                back += light.intensity * entering_irradiance(n_back, light.direction, eta);
             }
             result.front(x, y) = front.cast<float>();
             result.back(x, y) = back.cast<float>();

@@ -132,12 +132,12 @@ TEST(Translucent, ObjectShadowsItself) {
     const std::vector<Vec3f> normal = {{-1, 0, 0}, {-1, 0, 0}, {1, 0, 0}};
     const std::vector<std::int16_t> ball_index = {0, 1, 1};
     const SurfacePoints points{position, normal, ball_index};
-    EXPECT_EQ(visibility(cluster, points, Vec3(-1, 0, 0)), (std::vector<float>{1, 0, 0}));
-    EXPECT_EQ(visibility(cluster, points, Vec3(1, 0, 0)), (std::vector<float>{0, 0, 1}));
+    EXPECT_EQ(Occluder(cluster).visibility(points, Vec3(-1, 0, 0)), (std::vector<float>{1, 0, 0}));
+    EXPECT_EQ(Occluder(cluster).visibility(points, Vec3(1, 0, 0)), (std::vector<float>{0, 0, 1}));
     Relief bunch = cluster;
     bunch.unseen_balls = {{Vec3f(-30, -50, 0), 30}};
-    EXPECT_EQ(visibility(bunch, points, Vec3(-1, 0, 0)), (std::vector<float>{0, 0, 0}));
-    const SkyShares sky = sky_shares(cluster, points);
+    EXPECT_EQ(Occluder(bunch).visibility(points, Vec3(-1, 0, 0)), (std::vector<float>{0, 0, 0}));
+    const SkyShares sky = sky_shares(Occluder(cluster), points);
     EXPECT_FLOAT_EQ(sky.ambient[0], 1);
     EXPECT_LT(sky.ambient[1], 0.95f);
     EXPECT_NEAR(sky.below[0], 0.5, 0.05);

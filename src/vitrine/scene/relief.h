@@ -37,6 +37,23 @@ struct Relief {
     float back_px(int x, int y) const {
         return middle_px.empty() ? -depth_px(x, y) : 2 * middle_px(x, y) - depth_px(x, y);
     }
+    /// Outward normal of the unseen back: the front's, mirrored, turned by the slope of the middle.
+    Vec3f back_normal(int x, int y) const {
+        const Vec3f n = normals(x, y);
+        if (middle_px.empty()) return {n.x(), n.y(), -n.z()};
+        const auto slope = [&](int x0, int y0, int x1, int y1) {
+            const float run = static_cast<float>(std::abs(x1 - x0) + std::abs(y1 - y0));
+            if (run == 0) return 0.0f;
+            return (middle_px(x1, y1) - middle_px(x0, y0)) / run;
+        };
+        const auto inside = [&](int u, int v) {
+            return mask.contains(u, v) && is_inside(mask, u, v);
+        };
+        const float mx = slope(inside(x - 1, y) ? x - 1 : x, y, inside(x + 1, y) ? x + 1 : x, y);
+        const float my = slope(x, inside(x, y + 1) ? y + 1 : y, x, inside(x, y - 1) ? y - 1 : y);
+        const float nz = std::max(n.z(), 0.05f);
+        return Vec3f(2 * mx + n.x() / nz, 2 * my + n.y() / nz, -1).normalized();
+    }
     bool is_cluster() const { return !balls.empty(); }
     Vec3f point(int x, int y) const {
         return {static_cast<float>(x), static_cast<float>(-y), depth_px(x, y)};
