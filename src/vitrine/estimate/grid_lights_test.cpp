@@ -1,6 +1,7 @@
 #include "estimate/grid_lights.h"
 
 #include "estimate/light_search.h"
+#include "estimate/test_table.h"
 #include "geometry/primitives.h"
 #include "render/hemisphere_photons.h"
 
@@ -22,50 +23,29 @@ class GridLightsTest : public ::testing::Test {
         part.name = "scan";
         part.mesh = std::make_shared<const Mesh>(std::move(scan));
         scene_.parts.push_back(part);
-        for (int k = 0; k < 6; ++k) {
-            Camera camera;
-            camera.width = 80;
-            camera.height = 60;
-            camera.fx = camera.fy = 75;
-            camera.cx = 39.5;
-            camera.cy = 29.5;
-            const double angle = 2.0 * kPi * k / 6.0;
-            camera.cam_from_world = look_at(Vec3(0.6 * std::cos(angle), 0.6 * std::sin(angle), 0.5),
-                                            Vec3::Zero(), Vec3(0, 0, 1))
-                                        .inverse();
-            scene_.cameras.push_back(camera);
-        }
+        scene_.cameras = cameras_around_table(6, 80, 60, 75.0);
         options_.samples.count = 1500;
         options_.samples.gather_rays = 4;
         photons_.photon_count = 20'000;
     }
 
     void shade(const Vec3& light, double watt_per_sr, bool has_shadows) {
-        frames_.clear();
-        const EstimationScene world(scene_);
-        for (const Camera& camera : scene_.cameras) {
-            RgbdFrame frame;
-            frame.id = std::to_string(frames_.size());
-            frame.camera = camera;
-            frame.colour = ImageRgb(camera.width, camera.height);
-            const Vec3f eye = camera.centre_in_world().cast<float>();
-            for (int v = 0; v < camera.height; ++v)
-                for (int u = 0; u < camera.width; ++u) {
-                    const Hit hit = world.accel().closest(
-                        {eye, camera.ray_in_world(u, v).cast<float>(), 0.0f, 1e30f, kAllMask});
-                    if (!hit.is_hit()) continue;
-                    const SurfacePoint at{hit_point(world.mesh(0), hit), hit.normal};
-                    const Vec3f to_light = light.cast<float>() - at.position;
-                    const float cosine = std::max(0.0f, at.normal.dot(to_light.normalized()));
-                    const Vec3f origin = at.position + world.offset_m() * at.normal;
-                    const bool is_dark =
-                        has_shadows && world.accel().is_occluded({origin, to_light, 0.0f, 1.0f});
-                    if (is_dark) continue;
-                    frame.colour(u, v) = Rgb::Constant(static_cast<float>(0.5 / kPi * watt_per_sr) *
-                                                       cosine / to_light.squaredNorm());
-                }
-            frames_.push_back(std::move(frame));
-        }
+        const auto shade_point = [&](const EstimationScene& world, const SurfacePoint& at) -> Rgb {
+            const Vec3f to_light = light.cast<float>() - at.position;
+            const float cosine = std::max(0.0f, at.normal.dot(to_light.normalized()));
+            const Vec3f origin = at.position + world.offset_m() * at.normal;
+            if (has_shadows && world.accel().is_occluded({origin, to_light, 0.0f, 1.0f}))
+                return Rgb::Zero();
+            return Rgb::Constant(static_cast<float>(0.5 / kPi * watt_per_sr) * cosine /
+                                 to_light.squaredNorm());
+        };
+        frames_ = shaded_frames(
+            scene_, [&](const EstimationScene& world, const std::vector<SurfacePoint>& points,
+                        const std::vector<Hit>&) {
+                std::vector<Rgb> radiance;
+                for (const SurfacePoint& at : points) radiance.push_back(shade_point(world, at));
+                return radiance;
+            });
     }
 
     GridLightEstimate estimate(GridLightModel model) {

@@ -250,7 +250,7 @@ double evidence_over(const LightFit& fit, const LightSet& better, const LightSet
 LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k) {
     // Shadows' borders cross samples one by one, so second differences are noisy like one over the
     // square of the step: with half of these the curvature is often singular by chance, and
-    // deviations come out up to ten times too large.
+    // deviations come out several times too large.
     const Vector steps(0.04, 0.04, 0.16, 0.6);
     std::vector<double> weight;
     const auto evaluate = [&](const Vector& x, std::vector<double>& loss) {

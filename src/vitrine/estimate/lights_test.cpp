@@ -4,6 +4,7 @@
 #include "base/parallel.h"
 #include "base/rng.h"
 #include "estimate/light_search.h"
+#include "estimate/test_table.h"
 #include "geometry/primitives.h"
 
 #include <gtest/gtest.h>
@@ -39,45 +40,10 @@ World make_world(const std::vector<DiscLight>& lights, float ambient, float clip
     part.material = diffuse;
     part.mesh = std::make_shared<const Mesh>(scan);
     world.scene.parts.push_back(part);
-    for (int k = 0; k < 6; ++k) {
-        const double angle = 2.0 * kPi * k / 6.0;
-        Camera camera;
-        camera.width = 160;
-        camera.height = 120;
-        camera.fx = camera.fy = 150;
-        camera.cx = 79.5;
-        camera.cy = 59.5;
-        camera.cam_from_world = look_at(Vec3(0.6 * std::cos(angle), 0.6 * std::sin(angle), 0.5),
-                                        Vec3::Zero(), Vec3(0, 0, 1))
-                                    .inverse();
-        world.scene.cameras.push_back(camera);
-    }
-    const EstimationScene estimation(world.scene);
-    for (const Camera& camera : world.scene.cameras) {
-        RgbdFrame frame;
-        frame.id = std::to_string(world.frames.size());
-        frame.camera = camera;
-        frame.colour = ImageRgb(camera.width, camera.height);
-        std::vector<SurfacePoint> points;
-        std::vector<std::pair<int, int>> pixels;
-        std::vector<Rgb> colours;
-        const Vec3f origin = camera.centre_in_world().cast<float>();
-        for (int v = 0; v < camera.height; ++v)
-            for (int u = 0; u < camera.width; ++u) {
-                const Hit hit = estimation.accel().closest(
-                    {origin, camera.ray_in_world(u, v).cast<float>(), 0.0f, 1e30f, kAllMask});
-                if (!hit.is_hit()) continue;
-                const Triangle& t = scan.triangles[static_cast<std::size_t>(hit.triangle)];
-                points.push_back({hit_point(scan, hit), hit.normal});
-                const Vec3f& p = points.back().position;  // squares of paint, 3 cm wide
-                const auto square =
-                    static_cast<std::uint64_t>(std::floor(p.x() / 0.03f) + 100) +
-                    1000 * static_cast<std::uint64_t>(std::floor(p.y() / 0.03f) + 100);
-                const float paint = static_cast<float>(mix_bits(square) >> 40) * 0x1p-24f - 0.5f;
-                colours.push_back((1.0f + texture * paint) *
-                                  albedo[static_cast<std::size_t>(t[0])]);
-                pixels.emplace_back(u, v);
-            }
+    world.scene.cameras = cameras_around_table(6, 160, 120, 150.0);
+    world.frames = shaded_frames(world.scene, [&](const EstimationScene& estimation,
+                                                  const std::vector<SurfacePoint>& points,
+                                                  const std::vector<Hit>& hits) {
         std::vector<Rgb> irradiance(points.size(), Rgb::Zero());
         for (const DiscLight& light : lights) {
             const DirectColumn column =
@@ -87,11 +53,19 @@ World make_world(const std::vector<DiscLight>& lights, float ambient, float clip
                 irradiance[i] += column.clear[i] * light.intensity_w_per_sr;
         }
         const GatheredLight gathered = gather_light(estimation, points, 12, 0, {}, 7);
-        for (std::size_t i = 0; i < points.size(); ++i)
-            frame.colour(pixels[i].first, pixels[i].second) =
-                (colours[i] / kPif * (irradiance[i] + ambient * gathered.openness[i])).min(clip);
-        world.frames.push_back(std::move(frame));
-    }
+        std::vector<Rgb> radiance;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+            const Triangle& t = scan.triangles[static_cast<std::size_t>(hits[i].triangle)];
+            const Vec3f& p = points[i].position;  // squares of paint, 3 cm wide
+            const auto square = static_cast<std::uint64_t>(std::floor(p.x() / 0.03f) + 100) +
+                                1000 * static_cast<std::uint64_t>(std::floor(p.y() / 0.03f) + 100);
+            const float paint = static_cast<float>(mix_bits(square) >> 40) * 0x1p-24f - 0.5f;
+            const Rgb colour = (1.0f + texture * paint) * albedo[static_cast<std::size_t>(t[0])];
+            radiance.push_back(
+                (colour / kPif * (irradiance[i] + ambient * gathered.openness[i])).min(clip));
+        }
+        return radiance;
+    });
     return world;
 }
 
