@@ -80,7 +80,7 @@ RefineOptions fine(int evaluations) {
 /// insists: on a flat stretch the least cost is chance.
 LightSet with_likely_radii(const LightFit& fit, LightSet set, const RefineOptions& options) {
     constexpr double kMaxRadiusPerDistance = 0.3;
-    constexpr double kRadiusEvidence = 1.0;  // deviations from block to block
+    constexpr double kRadiusEvidence = 2.0;  // deviations from block to block
     for (std::size_t k = 0; k < set.lights.size(); ++k) {
         LightSet best = set;
         for (const double factor : {0.25, 0.5, 2.0, 4.0}) {

@@ -15,8 +15,8 @@ double irradiance(const PolarLight& light) {
     return light.weight / (light.distance_m * light.distance_m);
 }
 
-const LampError& model_error_of(const LightSet& set, std::size_t k) {
-    if (set.lights.size() == 1) return kSingleLamp;
+const LampError& model_error_of(const LightSet& set, std::size_t k, bool is_distant) {
+    if (set.lights.size() == 1) return is_distant ? kSun : kSingleLamp;
     for (const PolarLight& other : set.lights)
         if (irradiance(other) > irradiance(set.lights[k])) return kWeakerLamp;
     return kStrongestLamp;
@@ -32,7 +32,7 @@ FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_
     fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
     fitted.is_distant = is_distant;
     const LightDeviation deviation = light_deviation(fit, set, k);
-    const LampError& model = model_error_of(set, k);
+    const LampError& model = model_error_of(set, k, is_distant);
     log_debug("light {}: resampled deviations of angle {:.5f} rad, distance {:.4f}, radius {:.3f}",
               k, deviation.direction_rad, deviation.log_distance, deviation.log_radius);
     const double log_distance = std::hypot(deviation.log_distance, model.log_distance);

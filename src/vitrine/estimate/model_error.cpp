@@ -1,5 +1,6 @@
 #include "estimate/model_error.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vitrine {
@@ -25,8 +26,12 @@ void add_model_error(TransparentFit& solid, const TransparentOptions& options) {
 }
 
 void add_model_error(WardFit& fit, double light_stddev) {
-    fit.sigma.stddev = std::hypot(fit.sigma.stddev, kModelLogSigma * fit.sigma.value);
-    fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, kModelRhoD, kModelLogRhoD);
+    constexpr double kMaxWidening = 0.5;
+    const double normals = kHullNormal_rad / std::max(fit.sigma.value, 1e-3);
+    fit.sigma.stddev = std::hypot(fit.sigma.stddev, fit.sigma.value * kModelLogSigma,
+                                  fit.sigma.value * std::min(kMaxWidening, normals * normals));
+    fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, 0.0, kModelLogRhoD);
+    fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_s, 0.0, kModelRhoDPerRhoS);
     fit.stddev_rho_d = with_share(fit.stddev_rho_d, fit.ward.rho_d, 0.0, light_stddev);
     fit.stddev_rho_s =
         with_share(fit.stddev_rho_s, fit.ward.rho_s, 0.0, std::hypot(kModelLogRhoS, light_stddev));

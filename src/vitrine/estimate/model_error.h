@@ -18,21 +18,25 @@ struct LampError {
 // Waves of paint wider than a patch look like a nearer or a further lamp; the known albedo is read
 // at one spot. Directions of a single lamp are as good as resampling says.
 constexpr LampError kSingleLamp = {0.0, 0.02, 0.02};
+// Of the sun only the direction can give way to such waves.
+constexpr LampError kSun = {0.012, 0.02, 0.02};
 // Of several lamps each may stand a little off while another makes up for it; the weaker one shows
 // in little but its own shadows.
-constexpr LampError kStrongestLamp = {0.008, 0.02, 0.03};
-constexpr LampError kWeakerLamp = {0.012, 0.02, 0.06};
+constexpr LampError kStrongestLamp = {0.004, 0.02, 0.03};
+constexpr LampError kWeakerLamp = {0.012, 0.03, 0.06};
 // Penumbrae are about as narrow as what a pixel sees of the table.
-constexpr double kModelLogRadius = 0.15;
+constexpr double kModelLogRadius = 0.2;
 
 // Index: grows with the residual, which is large where the hull is off.
 constexpr double kModelIorPerCost = 0.25;
 constexpr double kModelAbsorption = 0.05;  // per metre
 constexpr double kModelAbsorptionRatio = 0.015;
 
-// Ward: relative; a hull's normals move light between lobe and diffuse.
-constexpr double kModelLogSigma = 0.04;
-constexpr double kModelRhoD = 0.0015;  // absolute: next to a lobe little is left for diffuse light
+// Ward: relative. A hull's normals are off by this much, which widens or narrows a lobe by the
+// square over its own, and move light between lobe and diffuse.
+constexpr double kHullNormal_rad = 0.025;
+constexpr double kModelLogSigma = 0.03;
+constexpr double kModelRhoDPerRhoS = 0.01;  // what the lobe mirrors is not known better
 constexpr double kModelLogRhoD = 0.02;
 constexpr double kModelLogRhoS = 0.065;
 

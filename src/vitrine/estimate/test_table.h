@@ -30,8 +30,8 @@ inline std::vector<Camera> cameras_around_table(int count, int width, int height
     return cameras;
 }
 
-/// One frame per camera. `shade(points, hits)` gives the radiance of all pixels of a frame that meet
-/// the scan; the others stay black.
+/// One frame per camera. `shade(points, hits)` gives the radiance of all pixels of a frame that
+/// meet the scan; the others stay black.
 template <typename Shade>
 std::vector<RgbdFrame> shaded_frames(const Scene& scene, const Shade& shade) {
     const EstimationScene world(scene);
