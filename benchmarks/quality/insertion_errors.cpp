@@ -2,14 +2,15 @@
 // object is from what many more paths make of it.
 //
 // SCENE.json is the 40_scene/scene.json of a workspace. The frame is rendered as `vitrine insert`
-// does, and once more with other random numbers and 64 to 1024 paths a pixel. Printed is the root
-// mean square of what differs as displayed (sRGB, 0 to 1), pixel by pixel and of the means over
-// 4 x 4 pixels, on the virtual object, where it changes the picture much (its shadow, caustics) and
-// where it changes it little.
+// does, and once more with other random numbers and 64 to 1024 paths a pixel; both are composed
+// with one plate, the latter's picture without the object. Printed is the root mean square of what
+// differs as displayed (sRGB, 0 to 1), pixel by pixel and of the means over 4 x 4 pixels, on the
+// virtual object, where it changes the picture much (its shadow, caustics) and where it changes it
+// little.
+#include "compose/composite.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
-#include "render/differential.h"
 #include "scene/insertion.h"
 
 #include <CLI/CLI.hpp>
@@ -81,9 +82,10 @@ double rms(const ImageRgb& error, const Mask& region, int side) {
 
 void compare(const Options& options, const DifferentialImage& image,
              const DifferentialImage& reference) {
-    const ImageRgb shown = displayed(image.with, options.white);
-    const ImageRgb true_with = displayed(reference.with, options.white);
-    const ImageRgb true_without = displayed(reference.without, options.white);
+    const ImageRgb& plate = reference.without;
+    const ImageRgb shown = displayed(composite(plate, image), options.white);
+    const ImageRgb true_with = displayed(composite(plate, reference), options.white);
+    const ImageRgb true_without = displayed(plate, options.white);
     const int width = shown.width(), height = shown.height();
     ImageRgb error(width, height), change(width, height);
     for (std::size_t i = 0; i < error.size(); ++i) {

@@ -43,7 +43,7 @@ Mask all_special(const fs::path& folder, const std::string& frame, const Camera&
 struct RelativeError {
     double mean = 0, median = 0, bias = 0;
     double noise = 0;  ///< mean of what pixel noise alone makes of it, of both pictures
-    double ours = 0;   ///< of ours alone, by the spread of its paths
+    double ours = 0;   ///< of ours alone, by the spread of its paths (its sharp light)
     std::size_t count = 0;
 };
 
@@ -96,7 +96,7 @@ void compare_plain(const RenderQualityOptions& options, const TruthScene& truth,
         const fs::path file = folder / "linear" / (camera.id + ".exr");
         if (!fs::exists(file) || !options.takes(camera.id)) continue;
         const ImageRgb reference = read_exr_rgb(file);
-        FinalOptions final_options;
+        FinalOptions final_options = picture_options();
         final_options.samples_per_pixel = options.samples;
         Timer timer;
         const RenderedImage image = render_image(scene, camera, &maps, final_options);

@@ -15,7 +15,7 @@ struct RenderQualityOptions {
     std::string capture;
     std::string insert = "insert";
     std::string out;
-    int samples = 64;
+    int samples = 16;
     double crease_deg = kCreaseDeg, object_crease_deg = kCreaseDeg;
     bool has_second_seed = false;
     std::vector<std::string> frames;

@@ -6,7 +6,6 @@
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
-#include "math/statistics.h"
 #include "plain_quality.h"
 
 #include <CLI/CLI.hpp>
@@ -20,9 +19,6 @@ namespace fs = std::filesystem;
 Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
 
 constexpr double kBlurPx = 2.0;
-
-/// Of the picture's mean.
-constexpr double kFirefly = 0.1;
 
 /// Clipped as the camera does, then with - without.
 ImageRgb raw_difference(const ImageRgb& with, const ImageRgb& without, float top) {
@@ -87,23 +83,6 @@ double noise_rms(const ImageRgb& truth, const ImageRgb& estimate, double level) 
     return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
 }
 
-/// Pixels of the true difference that stand out alone from their eight neighbours by more than a
-/// tenth of the picture's mean: fireflies of the other renderer.
-Mask find_fireflies(const ImageRgb& difference, double level) {
-    Mask found(difference.width(), difference.height());
-    for (int y = 1; y + 1 < difference.height(); ++y) {
-        for (int x = 1; x + 1 < difference.width(); ++x) {
-            std::vector<double> around;
-            for (int k = 0; k < 9; ++k) {
-                if (k != 4) around.push_back(luminance(difference(x - 1 + k % 3, y - 1 + k / 3)));
-            }
-            const double off = luminance(difference(x, y)) - median(std::move(around));
-            found(x, y) = std::abs(off) > kFirefly * level ? 255 : 0;
-        }
-    }
-    return found;
-}
-
 void compare_insertion(const RenderQualityOptions& options, const TruthScene& truth) {
     const fs::path folder = fs::path(options.capture) / "truth" / options.insert;
     if (!fs::exists(folder / "insert.json")) return;
@@ -153,8 +132,6 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
         const auto is_changed = [&](std::size_t i) {
             return around[i] < 128 && d_true[i].abs().maxCoeff() > 0.02 * level;
         };
-        const Mask fireflies = find_fireflies(raw_true, level);
-        const Mask near_firefly = dilate(fireflies, 6);
         for (const auto* d : {&d_render, &d_composite}) {
             // Glints of the lamp in glass are a few saturated pixels, undersampled in the truth.
             const auto is_glint = [&](std::size_t i) {
@@ -166,10 +143,6 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
             const RegionError calm =
                 region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return object[i] > 127 && near_glint[i] < 128; });
-            const RegionError smooth =
-                region_error(d_true, *d, noise, noise_variance, [&](std::size_t i) {
-                    return is_changed(i) && d_true[i].sum() > 0 && near_firefly[i] < 128;
-                });
             const RegionError e[4] = {
                 region_error(d_true, *d, noise, noise_variance,
                              [&](std::size_t i) { return object[i] > 127; }),
@@ -184,13 +157,7 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
             for (std::size_t k = 0; k < 4; ++k) {
                 std::printf("  %s %.3f (%.3f, %.3f)", names[k], e[k].error, e[k].floor, e[k].noise);
             }
-            std::printf(
-                "  object off glints %.3f  brighter off fireflies %.3f (%.3f, %.3f; %.2f of it)"
-                "  %.1f s\n",
-                calm.error, smooth.error, smooth.floor, smooth.noise,
-                static_cast<double>(smooth.count) /
-                    static_cast<double>(std::max<std::size_t>(1, e[2].count)),
-                seconds);
+            std::printf("  object off glints %.3f  %.1f s\n", calm.error, seconds);
         }
         if (second) {
             const DifferentialImage twin = second->render(camera);
@@ -230,7 +197,8 @@ int run(int argc, char** argv) {
     app.add_option("--insert", options.insert, "Folder of the insertion's truth");
     app.add_option("--frames", options.frames, "Ids of the frames to look at; default all");
     app.add_option("--out", options.out, "Write pictures here");
-    app.add_option("--samples", options.samples, "Samples per pixel of the plain renders");
+    app.add_option("--samples", options.samples,
+                   "Samples per pixel of the plain renders, at least");
     app.add_option("--photon-count", options.differential.photon_count, "Photons shot");
     app.add_option("--noise-target", options.differential.noise_target, "See DifferentialOptions");
     app.add_option("--max-samples", options.differential.max_samples, "See DifferentialOptions");

@@ -16,7 +16,7 @@ namespace vitrine {
 struct DifferentialOptions {
     int min_samples = 4;       ///< paths per pixel everywhere, enough to see where work is needed
     int min_soft_samples = 2;  ///< those that go on from plain surfaces, see soft_light.h
-    int max_samples = 48;      ///< paths per pixel where the change is noisy
+    int max_samples = 40;      ///< paths per pixel where the change is noisy
     /// Standard error per pixel, of its own luminance or the picture's mean, whichever is brighter.
     double noise_target = 0.008;
     std::uint64_t photon_count = 3'000'000;
