@@ -24,7 +24,10 @@ std::vector<Vote> cast_votes(const Highlights& highlights, const Relief& relief)
             sum += luminance(highlights.residual[i]) * (2 * n.z() * n - Vec3(0, 0, 1));
         }
         if (sum.norm() < 1e-9) continue;
-        votes.push_back({sum.normalized(), blob.weight, blob.colour.cast<double>()});
+        // A pixel more or less turns the normal by 1 / n_z: at the rim an image says little.
+        const Vec3 direction = sum.normalized();
+        const double normal_z2 = 0.5 * (1 + direction.z());  // n is half way from v to the lamp
+        votes.push_back({direction, blob.weight * normal_z2, blob.colour.cast<double>()});
     }
     return votes;
 }

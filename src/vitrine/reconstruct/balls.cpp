@@ -167,6 +167,42 @@ std::vector<EdgePoint> edges_of(const cv::Mat& lab, const cv::Mat& share, double
     return points;
 }
 
+/// How far from round the outline is (Ball::oval), with the circle's own corrections: least squares
+/// on the radii of its edges, ovals of more than 5 % unlikely. Moves the circle.
+Vec2f fit_oval(Circle& circle, const std::vector<EdgePoint>& points) {
+    using Vec5 = Eigen::Matrix<double, 5, 1>;
+    constexpr double kReach = 0.09, kScatter = 0.03, kUsualOval = 0.05;
+    Vec5 x = Vec5::Zero();
+    for (int round = 0; round < 3; ++round) {
+        Eigen::Matrix<double, 5, 5> normal = Eigen::Matrix<double, 5, 5>::Zero();
+        Vec5 right = Vec5::Zero();
+        // An outline gives a few dozen independent looks, however many edge points there are.
+        double on = 0;
+        for (const EdgePoint& point : points) {
+            if (!lies_on(point, circle, kReach * circle.radius, 0.9)) continue;
+            const Vec2 v = point.at - circle.centre;
+            const double t = std::atan2(-v.y(), v.x()), size = v.norm() / circle.radius - 1;
+            Vec5 row;
+            row << std::cos(t), std::sin(t), 1, std::cos(2 * t), std::sin(2 * t);
+            const double off = (size - row.dot(x)) / kScatter;
+            const double weight = (point.is_border ? 4.0 : 1.0) / (1 + off * off);
+            normal += weight * row * row.transpose();
+            right += weight * size * row;
+            on += weight;
+        }
+        if (on < 12) return Vec2f::Zero();
+        constexpr double kLooks = 40;
+        normal *= kLooks / on;
+        right *= kLooks / on;
+        normal.diagonal().tail<2>().array() += std::pow(kScatter / kUsualOval, 2);
+        x = normal.ldlt().solve(right);
+    }
+    if (x.head<3>().norm() > 0.06 || x.tail<2>().norm() > 0.15) return Vec2f::Zero();
+    circle.centre += circle.radius * Vec2(x[0], -x[1]);
+    circle.radius *= 1 + x[2];
+    return x.tail<2>().cast<float>();
+}
+
 /// The circle again at finer resolution, ever closer to its edges. The object's border is the
 /// surest outline; edges of highlights and shadows beside it must not pull.
 Ball sharpened(const Ball& ball, const std::vector<EdgePoint>& points, double shrink) {
@@ -190,9 +226,10 @@ Ball sharpened(const Ball& ball, const std::vector<EdgePoint>& points, double sh
         circle.centre = x.head<2>();
         circle.radius = radius;
     }
+    const Vec2f oval = fit_oval(circle, points);
     return {Vec3f(static_cast<float>(to_full(circle.centre.x(), shrink)),
                   static_cast<float>(-to_full(circle.centre.y(), shrink)), ball.centre_px.z()),
-            static_cast<float>(circle.radius / shrink)};
+            static_cast<float>(circle.radius / shrink), oval};
 }
 
 double overlap_chord(const Ball& a, const Ball& b) {
@@ -372,8 +409,11 @@ Relief relief_of_balls(const Mask& mask, std::vector<Ball> balls) {
             float highest = -1e30f, nearest = 1e30f;
             for (std::size_t k = 0; k < balls.size(); ++k) {
                 const Ball& ball = balls[k];
-                const Vec2f v(static_cast<float>(x) - ball.centre_px.x(),
-                              static_cast<float>(-y) - ball.centre_px.y());
+                Eigen::Matrix2f round;  // takes the oval outline to the circle
+                round << 1 + ball.oval.x(), ball.oval.y(), ball.oval.y(), 1 - ball.oval.x();
+                round = round.inverse().eval();
+                const Vec2f v = round * Vec2f(static_cast<float>(x) - ball.centre_px.x(),
+                                              static_cast<float>(-y) - ball.centre_px.y());
                 const float rest = ball.radius_px * ball.radius_px - v.squaredNorm();
                 if (rest > 0) {
                     const float z = ball.centre_px.z() + std::sqrt(rest);
@@ -381,7 +421,8 @@ Relief relief_of_balls(const Mask& mask, std::vector<Ball> balls) {
                     highest = z;
                     relief.ball_of(x, y) = static_cast<std::int16_t>(k);
                     relief.depth_px(x, y) = z;
-                    relief.normals(x, y) = Vec3f(v.x(), v.y(), std::sqrt(rest)) / ball.radius_px;
+                    const Vec2f n = round * v;
+                    relief.normals(x, y) = Vec3f(n.x(), n.y(), std::sqrt(rest)).normalized();
                 } else if (relief.ball_of(x, y) < 0) {
                     const float gap = v.norm() - ball.radius_px;
                     if (gap >= nearest) continue;

@@ -12,19 +12,20 @@ struct Picture {
     Mask mask{260, 220};
 };
 
-/// Balls in front of each other in the order of their height, softly lit.
-Picture picture_of(const std::vector<Ball>& balls) {
+/// Balls in front of each other in the order of their height, softly lit; `tall`: stretched upward
+/// by this factor and squeezed across by it.
+Picture picture_of(const std::vector<Ball>& balls, float tall = 1) {
     Picture picture;
     for (int y = 0; y < picture.mask.height(); ++y) {
         for (int x = 0; x < picture.mask.width(); ++x) {
             float highest = -1e30f;
             for (const Ball& ball : balls) {
-                const Vec3f v(static_cast<float>(x) - ball.centre_px.x(),
-                              static_cast<float>(-y) - ball.centre_px.y(), 0);
+                const Vec3f v((static_cast<float>(x) - ball.centre_px.x()) * tall,
+                              (static_cast<float>(-y) - ball.centre_px.y()) / tall, 0);
                 const float rest = ball.radius_px * ball.radius_px - v.squaredNorm();
                 if (rest <= 0 || ball.centre_px.z() + std::sqrt(rest) <= highest) continue;
                 highest = ball.centre_px.z() + std::sqrt(rest);
-                const Vec3f n = (v + Vec3f(0, 0, std::sqrt(rest))) / ball.radius_px;
+                const Vec3f n = Vec3f(v.x() * tall, v.y() / tall, std::sqrt(rest)).normalized();
                 const float light = std::max(0.0f, n.dot(Vec3f(-0.5f, 0.6f, 0.62f)));
                 picture.shown(x, y) = Rgb(0.5f, 0.7f, 0.2f) * (0.25f + 0.6f * light);
                 picture.mask(x, y) = 255;
@@ -77,6 +78,38 @@ TEST(Balls, ClusterIsFoundAndStacked) {
         }
     }
     EXPECT_LT(degrees(error / count), 5);
+}
+
+TEST(Balls, OvalOutlinesAreMeasured) {
+    constexpr float kTall = 1.04f;
+    const Picture picture = picture_of(grapes(), kTall);
+    const std::vector<Ball> found = find_balls(picture.shown, picture.mask);
+    ASSERT_GE(found.size(), 4u);
+    int at_border = 0;  // the one in the middle has no border of its own
+    for (const Ball& ball : found) {
+        if ((ball.centre_px.head<2>() - Vec2f(115, -130)).norm() < 15) continue;
+        EXPECT_NEAR(ball.oval.x(), 1 - kTall, 0.02);
+        EXPECT_NEAR(ball.oval.y(), 0, 0.02);
+        ++at_border;
+    }
+    EXPECT_GE(at_border, 4);
+    const Relief relief = relief_of_balls(picture.mask, found);
+    double oval_error = 0, round_error = 0, count = 0;
+    for (int y = 0; y < relief.mask.height(); ++y) {
+        for (int x = 0; x < relief.mask.width(); ++x) {
+            const Vec2f at(static_cast<float>(x) - 185, static_cast<float>(-y) + 135);
+            const Vec2f v(at.x() * kTall, at.y() / kTall);
+            const float rest = 36.0f * 36.0f - v.squaredNorm();
+            if (rest < 300 || at.squaredNorm() > 900) continue;
+            const Vec3f n = Vec3f(v.x() * kTall, v.y() / kTall, std::sqrt(rest)).normalized();
+            const Vec3f round(at.x(), at.y(), std::sqrt(36.0f * 36.0f - at.squaredNorm()));
+            oval_error += angle_between(relief.normals(x, y).cast<double>(), n.cast<double>());
+            round_error += angle_between(round.cast<double>(), n.cast<double>());
+            count += 1;
+        }
+    }
+    EXPECT_LT(oval_error, 0.7 * round_error);
+    EXPECT_LT(degrees(oval_error / count), 2.5);
 }
 
 TEST(Balls, ABunchGoesOnBehindWhatIsSeen) {

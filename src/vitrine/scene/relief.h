@@ -16,6 +16,10 @@ namespace vitrine {
 struct Ball {
     Vec3f centre_px = Vec3f::Zero();  ///< viewer frame: (column, -row, height)
     float radius_px = 0;
+    /// Of the outline, for what the picture shows of it: the radius at angle t from x toward y is
+    /// radius_px (1 + x cos 2t + y sin 2t). Berries are rarely quite round. Shadows and the light
+    /// inside take the ball for round.
+    Vec2f oval = Vec2f::Zero();
 };
 
 struct Relief {
