@@ -90,9 +90,16 @@ TransparentFit fit_shell(const EstimationScene& scene, const FrameLookup& lookup
         return square > 0.0 ? sum / std::sqrt(square) : 0.0;
     };
     fit.wall_m.outcome = Outcome::Converged;
-    if (best < kFactorTwo || best + kFactorTwo >= kWalls.size()) {
+    if (best < kFactorTwo) {
+        // The hull of an open vessel has a lid and a base as thin as its walls: the thinner all of
+        // them, the less is wrong with it, whatever the wall.
+        fit.wall_m.outcome = Outcome::NotIdentifiable;
+        fit.wall_m.reason =
+            "the thinnest walls explain it best: the lid that outlines put on an open vessel and "
+            "its thick base hide what the wall does";
+    } else if (best + kFactorTwo >= kWalls.size()) {
         fit.wall_m.outcome = Outcome::AtBound;
-        fit.wall_m.reason = "the best wall is as thin or as thick as walls are looked for";
+        fit.wall_m.reason = "the best wall is as thick as walls are looked for";
     } else if (std::min(evidence_against(best - kFactorTwo), evidence_against(best + kFactorTwo)) <
                kMinEvidence) {
         fit.wall_m.outcome = Outcome::NotIdentifiable;
