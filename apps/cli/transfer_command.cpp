@@ -25,8 +25,8 @@ std::optional<PixelBox> parse_box(const std::string& text, const std::string& op
     if (words.size() != 4) throw UsageError(option + ": four numbers x,y,w,h are needed");
     for (std::size_t i = 0; i < 4; ++i)
         if (!parse_double(words[i], v[i])) throw UsageError(option + ": not a number: " + words[i]);
-    return PixelBox{static_cast<int>(v[0]), static_cast<int>(v[1]), static_cast<int>(v[2]),
-                    static_cast<int>(v[3])};
+    const int x = static_cast<int>(v[0]), y = static_cast<int>(v[1]);
+    return PixelBox{x, y, x + static_cast<int>(v[2]), y + static_cast<int>(v[3])};
 }
 
 void add_inputs(CLI::App& command, TransferRequest& request, TransferTexts& texts) {

@@ -144,10 +144,11 @@ Mask largest_piece_filled(const Mask& mask) {
 
 Mask segment_box(const ImageRgb& linear, const PixelBox& box, const std::string& name) {
     const int width = linear.width(), height = linear.height();
-    if (box.width < 8 || box.height < 8 || box.x < 0 || box.y < 0 || box.x + box.width > width ||
-        box.y + box.height > height) {
+    if (box.width() < 8 || box.height() < 8 || box.x0 < 0 || box.y0 < 0 || box.x1 > width ||
+        box.y1 > height) {
         throw InputError({name, fmt::format("a box x,y,w,h within {} x {} pixels", width, height),
-                          fmt::format("{},{},{},{}", box.x, box.y, box.width, box.height), ""});
+                          fmt::format("{},{},{},{}", box.x0, box.y0, box.width(), box.height()),
+                          ""});
     }
     cv::Mat picture(height, width, CV_8UC3);
     for (int y = 0; y < height; ++y) {
@@ -169,8 +170,8 @@ Mask segment_box(const ImageRgb& linear, const PixelBox& box, const std::string&
     cv::Mat trimap(small.size(), CV_8UC1, cv::Scalar(cv::GC_BGD));
     for (int y = 0; y < small.rows; ++y) {
         for (int x = 0; x < small.cols; ++x) {
-            const double u = ((x + 0.5) / shrink - box.x) / box.width * 2 - 1;
-            const double v = ((y + 0.5) / shrink - box.y) / box.height * 2 - 1;
+            const double u = ((x + 0.5) / shrink - box.x0) / box.width() * 2 - 1;
+            const double v = ((y + 0.5) / shrink - box.y0) / box.height() * 2 - 1;
             if (std::max(std::abs(u), std::abs(v)) >= 1) continue;
             const double radius = std::hypot(u, v);
             trimap.at<std::uint8_t>(y, x) = radius < 0.35  ? cv::GC_FGD
@@ -231,13 +232,13 @@ Photo read_photo(const std::filesystem::path& path, const PhotoOptions& options)
         photo.mask = segment_box(photo.linear, *options.box, photo.name);
         const PixelBox& box = *options.box;
         bool touches = false;
-        for (int y = box.y; y < box.y + box.height; ++y) {
-            touches = touches || is_inside(photo.mask, box.x, y) ||
-                      is_inside(photo.mask, box.x + box.width - 1, y);
+        for (int y = box.y0; y < box.y1; ++y) {
+            touches =
+                touches || is_inside(photo.mask, box.x0, y) || is_inside(photo.mask, box.x1 - 1, y);
         }
-        for (int x = box.x; x < box.x + box.width; ++x) {
-            touches = touches || is_inside(photo.mask, x, box.y) ||
-                      is_inside(photo.mask, x, box.y + box.height - 1);
+        for (int x = box.x0; x < box.x1; ++x) {
+            touches =
+                touches || is_inside(photo.mask, x, box.y0) || is_inside(photo.mask, x, box.y1 - 1);
         }
         if (touches) {
             photo.warnings.push_back(photo.name +

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "image/image.h"
+#include "image/pixel_box.h"
 
 #include <filesystem>
 #include <optional>
@@ -18,17 +19,10 @@ struct Photo {
     std::vector<std::string> warnings;  ///< one plain sentence each
 };
 
-/// A rectangle of pixels with the object well inside.
-struct PixelBox {
-    int x = 0;
-    int y = 0;
-    int width = 0;
-    int height = 0;
-};
-
 struct PhotoOptions {
-    std::filesystem::path mask;     ///< 8-bit picture, > 127 inside; wins over the box
-    std::optional<PixelBox> box;    ///< segmented with GrabCut when there is no mask
+    std::filesystem::path mask;  ///< 8-bit picture, > 127 inside; wins over the box
+    std::optional<PixelBox>
+        box;  ///< with the object well inside; segmented with GrabCut when there is no mask
     bool is_linear = false;         ///< PNG and JPEG hold linear light instead of sRGB
     double min_inradius_px = 30.0;  ///< smaller objects tell nothing about scattering
 };

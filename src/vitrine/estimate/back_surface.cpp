@@ -145,7 +145,7 @@ std::optional<Relief> refine_back(const Relief& start, const ImageRgb& diffuse,
             if (shared(p, k) + price * k < shared(p, best) + price * best) best = k;
         log_cap[p] = std::log(caps[static_cast<std::size_t>(best)]);
     }
-    // Between the observations: their weighted mean, at a tenth of the inradius.
+    // Between the observations: their weighted mean, on a grid of a twentieth of the inradius.
     const int block = std::max(1, static_cast<int>(0.05 * start.inradius_px));
     const int columns = (start.mask.width() + block - 1) / block + 1;
     const int lines = (start.mask.height() + block - 1) / block + 1;

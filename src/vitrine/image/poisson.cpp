@@ -1,6 +1,7 @@
 #include "image/poisson.h"
 
 #include "base/parallel.h"
+#include "image/pixel_box.h"
 
 #include <array>
 #include <limits>
@@ -148,37 +149,6 @@ ImageF solve_level(const Mask& unknown, const ImageF& known, const ImageF& sourc
     return u;
 }
 
-/// Smallest rectangle with the inside of `mask`, grown by `margin`.
-struct Rectangle {
-    int x0 = 0, y0 = 0, width = 0, height = 0;
-};
-Rectangle bounding_box(const Mask& mask, int margin) {
-    int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
-    for (int y = 0; y < mask.height(); ++y) {
-        for (int x = 0; x < mask.width(); ++x) {
-            if (mask(x, y) <= 127) continue;
-            x0 = std::min(x0, x);
-            x1 = std::max(x1, x);
-            y0 = std::min(y0, y);
-            y1 = std::max(y1, y);
-        }
-    }
-    if (x1 < 0) return {};
-    x0 = std::max(0, x0 - margin);
-    y0 = std::max(0, y0 - margin);
-    x1 = std::min(mask.width() - 1, x1 + margin);
-    y1 = std::min(mask.height() - 1, y1 + margin);
-    return {x0, y0, x1 - x0 + 1, y1 - y0 + 1};
-}
-
-template <typename T>
-Image<T> crop(const Image<T>& image, const Rectangle& box) {
-    Image<T> result(box.width, box.height);
-    for (int y = 0; y < box.height; ++y)
-        for (int x = 0; x < box.width; ++x) result(x, y) = image(box.x0 + x, box.y0 + y);
-    return result;
-}
-
 /// Index of the nearest inside pixel of every pixel: two passes of the exact distance transform
 /// (columns by sweeping, rows by lower envelopes; Felzenszwalb and Huttenlocher 2012).
 Image<std::int32_t> nearest_inside(const Mask& mask) {
@@ -242,13 +212,13 @@ Image<T> extend(const Image<T>& image, const Mask& mask) {
 ImageF solve_poisson(const Mask& unknown, const ImageF& known, const ImageF& source,
                      const PoissonOptions& options) {
     VITRINE_CHECK(unknown.same_size(known) && unknown.same_size(source));
-    const Rectangle box = bounding_box(unknown, 1);
-    if (box.width == 0) return known;
+    const PixelBox box = PixelBox::of(unknown).grown(1, unknown.width(), unknown.height());
+    if (box.is_empty()) return known;
     const ImageF part =
         solve_level(crop(unknown, box), crop(known, box), crop(source, box), options);
     ImageF u = known;
-    for (int y = 0; y < box.height; ++y)
-        for (int x = 0; x < box.width; ++x) u(box.x0 + x, box.y0 + y) = part(x, y);
+    for (int y = 0; y < box.height(); ++y)
+        for (int x = 0; x < box.width(); ++x) u(box.x0 + x, box.y0 + y) = part(x, y);
     return u;
 }
 

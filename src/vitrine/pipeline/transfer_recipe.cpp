@@ -4,6 +4,7 @@
 #include "base/timer.h"
 #include "image/colour.h"
 #include "image/image_io.h"
+#include "image/pixel_box.h"
 #include "pipeline/transfer_report.h"
 
 #include <algorithm>
@@ -21,17 +22,8 @@ struct ReadyMaterial {
 };
 
 double object_px_per_m(const Mask& mask, double object_size_m) {
-    int x0 = mask.width(), x1 = -1, y0 = mask.height(), y1 = -1;
-    for (int y = 0; y < mask.height(); ++y) {
-        for (int x = 0; x < mask.width(); ++x) {
-            if (!is_inside(mask, x, y)) continue;
-            x0 = std::min(x0, x);
-            x1 = std::max(x1, x);
-            y0 = std::min(y0, y);
-            y1 = std::max(y1, y);
-        }
-    }
-    return std::max(x1 - x0 + 1, y1 - y0 + 1) / object_size_m;
+    const PixelBox box = PixelBox::of(mask);
+    return std::max(box.width(), box.height()) / object_size_m;
 }
 
 ReadyMaterial stored_material(const TransferRequest& request) {

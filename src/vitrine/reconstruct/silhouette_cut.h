@@ -7,21 +7,13 @@
 #pragma once
 
 #include "capture/capture.h"
+#include "image/pixel_box.h"
 #include "reconstruct/depth_classes.h"
 
 #include <span>
 #include <vector>
 
 namespace vitrine {
-
-/// A rectangle of pixels, half open.
-struct PixelBox {
-    int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
-    bool is_empty() const { return x1 <= x0 || y1 <= y0; }
-    void extend(int x, int y);
-    PixelBox grown(int by, int width, int height) const;
-    static PixelBox of(const Mask& mask);
-};
 
 /// What one view knows about one object.
 struct SilhouetteView {

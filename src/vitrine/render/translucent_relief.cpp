@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "image/filter.h"
+#include "image/pixel_box.h"
 #include "image/poisson.h"
 #include "optics/curved_body.h"
 #include "render/kernel_table.h"
@@ -156,38 +157,26 @@ Rgb bicubic(const ImageRgb& lattice, double x, double y) {
 /// Gaussian over the inside of the mask only; 0 outside.
 ImageRgb masked_blur(const ImageRgb& image, const Mask& mask, double sigma) {
     if (sigma < 0.3) return image;
-    // The object's box is often a small part of the picture.
-    int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
-    for (int y = 0; y < mask.height(); ++y) {
-        for (int x = 0; x < mask.width(); ++x) {
-            if (!is_inside(mask, x, y)) continue;
-            x0 = std::min(x0, x);
-            x1 = std::max(x1, x);
-            y0 = std::min(y0, y);
-            y1 = std::max(y1, y);
-        }
-    }
+    // The object is often a small part of the picture. A rim of zeros, which the blur repeats:
+    // nothing comes in from outside the mask.
     ImageRgb result(mask.width(), mask.height());
-    if (x1 < x0) return result;
-    // A rim of zeros, which blur() repeats: nothing comes in from outside the mask.
-    ImageRgb weighted(x1 - x0 + 3, y1 - y0 + 3);
-    ImageF weight(weighted.width(), weighted.height());
-    for (int y = y0; y <= y1; ++y) {
-        for (int x = x0; x <= x1; ++x) {
-            if (!is_inside(mask, x, y)) continue;
-            weighted(x - x0 + 1, y - y0 + 1) = image(x, y);
-            weight(x - x0 + 1, y - y0 + 1) = 1;
+    const PixelBox box = PixelBox::of(mask);
+    ImageRgb weighted(box.width() + 2, box.height() + 2);
+    ImageF weight(box.width() + 2, box.height() + 2);
+    for (int y = 0; y < box.height(); ++y) {
+        for (int x = 0; x < box.width(); ++x) {
+            if (!is_inside(mask, box.x0 + x, box.y0 + y)) continue;
+            weighted(x + 1, y + 1) = image(box.x0 + x, box.y0 + y);
+            weight(x + 1, y + 1) = 1;
         }
     }
     weighted = gaussian_blur(weighted, sigma);
     weight = gaussian_blur(weight, sigma);
-    for (int y = y0; y <= y1; ++y) {
-        for (int x = x0; x <= x1; ++x) {
-            if (!is_inside(mask, x, y)) continue;
-            result(x, y) =
-                weighted(x - x0 + 1, y - y0 + 1) / std::max(weight(x - x0 + 1, y - y0 + 1), 1e-6f);
-        }
-    }
+    for (int y = 0; y < box.height(); ++y)
+        for (int x = 0; x < box.width(); ++x)
+            if (is_inside(mask, box.x0 + x, box.y0 + y))
+                result(box.x0 + x, box.y0 + y) =
+                    weighted(x + 1, y + 1) / std::max(weight(x + 1, y + 1), 1e-6f);
     return result;
 }
 

@@ -1,6 +1,8 @@
 #include "render/translucent_samples.h"
 
 #include "base/parallel.h"
+#include "image/filter.h"
+#include "image/pixel_box.h"
 
 namespace vitrine {
 
@@ -41,19 +43,10 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
     VITRINE_CHECK_GT(per_side, 0);
     if (relief.is_cluster()) return sample_balls(relief, 2 * per_side);
     const Mask& mask = relief.mask;
-    std::size_t inside = 0;
-    int x0 = mask.width(), y0 = mask.height(), x1 = -1, y1 = -1;
-    for (int y = 0; y < mask.height(); ++y) {
-        for (int x = 0; x < mask.width(); ++x) {
-            if (!is_inside(mask, x, y)) continue;
-            ++inside;
-            x0 = std::min(x0, x);
-            x1 = std::max(x1, x);
-            y0 = std::min(y0, y);
-            y1 = std::max(y1, y);
-        }
-    }
+    const std::size_t inside = count_inside(mask);
     VITRINE_CHECK_GT(inside, 0u);
+    const PixelBox box = PixelBox::of(mask);
+    const int x0 = box.x0, y0 = box.y0, x1 = box.x1 - 1, y1 = box.y1 - 1;
     ReliefSamples samples;
     // Whole pixels: cells of unequal size would alias narrow kernels.
     samples.step_px = std::max(1.0, std::round(std::sqrt(static_cast<double>(inside) / per_side)));
