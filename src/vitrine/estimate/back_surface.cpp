@@ -23,23 +23,16 @@ constexpr double kLeastShare = 0.02;
 
 bool is_thinner(float before, float after) { return after < 0.7f * before; }
 
-Eigen::MatrixXf field(const std::vector<Rgb>& light, const std::vector<float>* area) {
-    Eigen::MatrixXf result(static_cast<Index>(light.size()), 3);
-    for (Index i = 0; i < result.rows(); ++i) {
-        const auto k = static_cast<std::size_t>(i);
-        result.row(i) = light[k].matrix().transpose() * (area == nullptr ? 1.0f : (*area)[k]);
-    }
-    return result;
-}
-
 MatrixXd predicted_exitance(const Relief& relief, const ReliefObservations& observations,
                             const EnteringLight& light, const MediumEstimate& medium, double eta,
                             int samples_per_side) {
     const ReliefSamples samples = sample_relief(relief, samples_per_side);
-    const Eigen::MatrixXf source =
-        field(light(relief, {samples.position, samples.normal, {}}, eta), &samples.area_px2);
+    Eigen::MatrixXf source =
+        irradiance_rows(light(relief, {samples.position, samples.normal, {}}, eta));
+    for (Index i = 0; i < source.rows(); ++i)
+        source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
     const Eigen::MatrixXf local =
-        field(light(relief, {observations.position, observations.normal, {}}, eta), nullptr);
+        irradiance_rows(light(relief, {observations.position, observations.normal, {}}, eta));
     std::vector<CurvedBodyFactor> bodies;
     for (const TwoExponentials& fit : medium.fit)
         bodies.push_back(curved_body_factor(std::min(fit.total(), kPlausibleAlbedo)));
@@ -97,14 +90,8 @@ std::optional<Relief> refine_back(const Relief& start, const ImageRgb& diffuse,
         draw_observations(start, excluded, static_cast<std::size_t>(options.observation_count), 2.0,
                           0.2, stream_key(options.seed, 0x33));
     if (observations.pixel.size() < 50) return {};
-    const ImageRgb smooth = gaussian_blur(diffuse, 1.0);
-    const auto rows = static_cast<Index>(observations.pixel.size());
-    MatrixXd observed(rows, 3);
-    for (Index p = 0; p < rows; ++p) {
-        const auto k = static_cast<std::size_t>(p);
-        observed.row(p) = smooth[observations.pixel[k]].cast<double>().matrix().transpose() *
-                          (kPi / leaving_transmittance(observations.normal[k], eta));
-    }
+    const MatrixXd observed = exitance_rows(gaussian_blur(diffuse, 1.0), observations, eta);
+    const Index rows = observed.rows();
 
     // Caps, thickest first; the first is none at all.
     const ImageF whole = thickness_of(start);

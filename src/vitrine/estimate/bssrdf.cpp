@@ -31,14 +31,6 @@ ImageRgb smooth_inside(const ImageRgb& image, const Mask& mask, const Mask& excl
     return weighted;
 }
 
-/// A field of irradiance as the histogram takes it.
-Eigen::MatrixXf as_matrix(const std::vector<Rgb>& irradiance) {
-    Eigen::MatrixXf field(static_cast<Index>(irradiance.size()), 3);
-    for (Index i = 0; i < field.rows(); ++i)
-        field.row(i) = irradiance[static_cast<std::size_t>(i)].matrix().transpose();
-    return field;
-}
-
 const char* const kChannelNames[3] = {"red", "green", "blue"};
 
 /// Albedos as they will be once the brightest is brought down to a plausible one.
@@ -133,21 +125,16 @@ MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const M
         return medium;
     }
     const ReliefSamples samples = sample_relief(relief, options.samples_per_side);
-    Eigen::MatrixXf source =
-        as_matrix(light(relief, {samples.position, samples.normal, samples.ball}, surface_eta));
+    Eigen::MatrixXf source = irradiance_rows(
+        light(relief, {samples.position, samples.normal, samples.ball}, surface_eta));
     for (Index i = 0; i < source.rows(); ++i)
         source.row(i) *= samples.area_px2[static_cast<std::size_t>(i)];
-    const Eigen::MatrixXf local = as_matrix(light(
+    const Eigen::MatrixXf local = irradiance_rows(light(
         relief, {observations.position, observations.normal, observations.ball}, surface_eta));
 
     const ImageRgb smooth =
         smooth_inside(diffuse, relief.mask, excluded, options.smoothing * relief.inradius_px);
-    MatrixXd exitance(static_cast<Index>(observations.pixel.size()), 3);
-    for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
-        exitance.row(static_cast<Index>(p)) =
-            smooth[observations.pixel[p]].cast<double>().matrix().transpose() *
-            (kPi / leaving_transmittance(observations.normal[p], surface_eta));
-    }
+    const MatrixXd exitance = exitance_rows(smooth, observations, surface_eta);
     double extent = 2 * relief.inradius_px;
     if (!relief.is_cluster())
         extent = 2 * std::sqrt(static_cast<double>(count_inside(relief.mask)) / kPi);

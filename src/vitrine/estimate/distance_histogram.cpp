@@ -55,6 +55,24 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
     return observations;
 }
 
+Eigen::MatrixXf irradiance_rows(const std::vector<Rgb>& irradiance) {
+    Eigen::MatrixXf rows(static_cast<Eigen::Index>(irradiance.size()), 3);
+    for (Eigen::Index i = 0; i < rows.rows(); ++i)
+        rows.row(i) = irradiance[static_cast<std::size_t>(i)].matrix().transpose();
+    return rows;
+}
+
+Eigen::MatrixXd exitance_rows(const ImageRgb& picture, const ReliefObservations& observations,
+                              double eta) {
+    Eigen::MatrixXd rows(static_cast<Eigen::Index>(observations.pixel.size()), 3);
+    for (std::size_t p = 0; p < observations.pixel.size(); ++p) {
+        rows.row(static_cast<Eigen::Index>(p)) =
+            picture[observations.pixel[p]].cast<double>().matrix().transpose() *
+            (kPi / leaving_transmittance(observations.normal[p], eta));
+    }
+    return rows;
+}
+
 DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
                                      const ReliefSamples& samples,
                                      const Eigen::MatrixXf& source_values,

@@ -44,6 +44,14 @@ struct ReliefObservations {
 ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
                                      double rim_px, double min_cos, std::uint64_t seed);
 
+/// Irradiance at points as a matrix: points x 3.
+Eigen::MatrixXf irradiance_rows(const std::vector<Rgb>& irradiance);
+
+/// The picture as a fit of R_d sees it, observations x 3: pi times the radiance, over the share of
+/// light that a surface of index `eta` lets leave.
+Eigen::MatrixXd exitance_rows(const ImageRgb& picture, const ReliefObservations& observations,
+                              double eta);
+
 /// For L source fields at once: node k of observation p holds sum_i hat_k(r_pi) C(s_pi)
 /// value(i, l), the sources spread onto the two radial nodes around their distance. On a cluster
 /// only sources of the same ball count.
