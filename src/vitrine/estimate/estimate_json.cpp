@@ -152,6 +152,7 @@ Json light_json(const FittedLight& fitted, const LightEstimate& estimate) {
     j["stddev_distance_m"] = fitted.stddev_distance_m;
     j["stddev_radius_m"] = fitted.stddev_radius_m;
     j["stddev_intensity_ratio"] = fitted.stddev_intensity_ratio;
+    j["stddev_irradiance_ratio"] = fitted.stddev_irradiance_ratio;
     j["is_distant"] = fitted.is_distant;
     if (fitted.is_distant)
         j["angular_radius_rad"] =
@@ -179,6 +180,7 @@ FittedLight read_fitted_light(const JsonObject& j, const LightEstimate& estimate
     fitted.stddev_distance_m = j.number_or("stddev_distance_m", 0.0);
     fitted.stddev_radius_m = j.number_or("stddev_radius_m", 0.0);
     fitted.stddev_intensity_ratio = j.number_or("stddev_intensity_ratio", 0.0);
+    fitted.stddev_irradiance_ratio = j.number_or("stddev_irradiance_ratio", 0.0);
     fitted.is_distant = j.boolean_or("is_distant", false);
     fitted.outcome = j.has("outcome") ? outcome_from_name(j.choice("outcome", kOutcomeWords))
                                       : Outcome::Converged;

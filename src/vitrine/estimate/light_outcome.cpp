@@ -25,28 +25,32 @@ const LampError& model_error_of(const LightSet& set, std::size_t k, bool is_dist
 }  // namespace
 
 FittedLight with_deviations(const LightFit& fit, const LightSet& set, std::size_t k,
-                            bool is_distant) {
+                            const LightDeviation& deviation, bool is_distant) {
     const PolarLight& polar = set.lights[k];
     const TrialLight trial = to_trial(polar, fit.samples().reference_point);
     FittedLight fitted;
     fitted.light = {trial.position_m, trial.normal, trial.radius_m, Rgb::Ones()};
     fitted.is_distant = is_distant;
-    const LightDeviation deviation = light_deviation(fit, set, k);
     const LampError& model = model_error_of(set, k, is_distant);
-    log_debug("light {}: resampled deviations of angle {:.5f} rad, distance {:.4f}, radius {:.3f}",
-              k, deviation.direction_rad, deviation.log_distance, deviation.log_radius);
+    log_debug(
+        "light {}: resampled deviations of angle {:.5f} rad, distance {:.4f}, radius {:.3f}, "
+        "intensity {:.4f}",
+        k, deviation.direction_rad, deviation.log_distance, deviation.log_radius,
+        deviation.log_intensity);
     const double log_distance = std::hypot(deviation.log_distance, model.log_distance);
     fitted.stddev_direction_deg =
         degrees(std::hypot(std::sqrt(2.0) * deviation.direction_rad, model.direction_rad));
     fitted.stddev_distance_m = polar.distance_m * log_distance;
     fitted.stddev_radius_m =
         trial.radius_m * std::hypot(deviation.log_radius, deviation.log_distance, kModelLogRadius);
-    fitted.stddev_intensity_ratio = std::hypot(2.0 * log_distance, model.log_irradiance);
+    fitted.stddev_intensity_ratio =
+        std::hypot(deviation.log_intensity, 2.0 * model.log_distance, model.log_irradiance);
+    fitted.stddev_irradiance_ratio = std::hypot(deviation.log_irradiance, model.log_irradiance);
     fitted.outcome = Outcome::Converged;
     if (!deviation.is_identifiable || fitted.stddev_direction_deg > kMaxDirectionDeviationDeg) {
         fitted.outcome = Outcome::NotIdentifiable;
         fitted.reason = "no shadow or second surface tells where this light stands";
-    } else if (deviation.is_at_bound) {
+    } else if (is_at_bound(fit, polar)) {
         fitted.outcome = Outcome::AtBound;
         fitted.reason =
             "the best place lies where lights are no longer looked for: within the scene or as "

@@ -4,8 +4,6 @@
 #include "math/optimise.h"
 #include "math/sampling.h"
 
-#include <Eigen/Eigenvalues>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,10 +18,9 @@ constexpr double kMinElevationSine = 0.05;  // lower lights graze the table and 
 constexpr double kFirstRadiusPerMetre = 0.04;
 constexpr double kMinDistancePerRadius = 0.8, kMaxDistancePerRadius = 12.0;
 constexpr double kPenalty = 10.0;
-// Deviation of a logarithm that nothing shows: a factor of two, more or less.
-constexpr double kUnknownLog = 0.7;
-constexpr int kDiscSamples = 16;       // of lamps that losses are compared for
-constexpr double kBoundMargin = 1.05;  // this near its end of the range, a light lies at it
+constexpr int kDiscSamples = 16;  // of lamps that losses are compared for
+
+}  // namespace
 
 Vec3 tilted(const Vec3& direction, double x, double y) {
     const Frame frame(direction.cast<float>());
@@ -31,36 +28,6 @@ Vec3 tilted(const Vec3& direction, double x, double y) {
             std::tan(y) * frame.bitangent.cast<double>())
         .normalized();
 }
-
-// Two angles, log distance, log radius of one light.
-constexpr int kCount = 4;
-using Vector = Eigen::Matrix<double, kCount, 1>;
-using Matrix = Eigen::Matrix<double, kCount, kCount>;
-
-bool is_flat(const Matrix& hessian, int a) {
-    constexpr double kFlat = 1e-3;  // of a loss in [0, 1]
-    return hessian(a, a) < kFlat;
-}
-
-/// Inverse of the curvature. Unlike quantities are scaled to unit curvature first; what does not
-/// curve at all is left out (zeros), and no combination is taken to be vaguer than 1 / kMinShare:
-/// less is the noise of second differences.
-Matrix inverse_of(const Matrix& hessian) {
-    constexpr double kMinShare = 0.15;
-    Vector scale = Vector::Zero();
-    for (int a = 0; a < kCount; ++a)
-        if (!is_flat(hessian, a)) scale[a] = 1.0 / std::sqrt(hessian(a, a));
-    const Eigen::SelfAdjointEigenSolver<Matrix> solver(scale.asDiagonal() * hessian *
-                                                       scale.asDiagonal());
-    Matrix inverse = Matrix::Zero();
-    for (int a = 0; a < kCount; ++a) {
-        const Vector v = scale.cwiseProduct(solver.eigenvectors().col(a));
-        inverse += v * v.transpose() / std::max(solver.eigenvalues()[a], kMinShare);
-    }
-    return inverse;
-}
-
-}  // namespace
 
 void sort_by_cost(std::vector<LightSet>& sets) {
     std::stable_sort(sets.begin(), sets.end(), [](const LightSet& a, const LightSet& b) {
@@ -205,6 +172,12 @@ LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineO
     return result;
 }
 
+bool is_at_bound(const LightFit& fit, const PolarLight& light) {
+    constexpr double kBoundMargin = 1.05;
+    return light.distance_m < kBoundMargin * kMinDistancePerRadius * fit.samples().scene_radius_m ||
+           light.direction.dot(fit.samples().plane.normal) < kBoundMargin * kMinElevationSine;
+}
+
 bool has_distant(const LightFit& fit, const LightSet& set) {
     return std::any_of(set.lights.begin(), set.lights.end(), [&](const PolarLight& light) {
         return light.distance_m > kMaxDistancePerRadius * fit.samples().scene_radius_m;
@@ -245,88 +218,6 @@ double evidence_over(const LightFit& fit, const LightSet& better, const LightSet
         square += value * value;
     }
     return square > 0.0 ? sum / std::sqrt(square) : 0.0;
-}
-
-LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k) {
-    // Shadows' borders cross samples one by one, so second differences are noisy like one over the
-    // square of the step: with half of these the curvature is often singular by chance, and
-    // deviations come out several times too large.
-    const Vector steps(0.04, 0.04, 0.16, 0.6);
-    std::vector<double> weight;
-    const auto evaluate = [&](const Vector& x, std::vector<double>& loss) {
-        std::vector<PolarLight> lights = set.lights;
-        lights[k].direction = tilted(lights[k].direction, x[0], x[1]);
-        lights[k].weight *= std::exp(2.0 * x[2]);
-        lights[k].distance_m *= std::exp(x[2]);
-        lights[k].radius_m *= std::exp(x[2] + x[3]);
-        const LightColumns columns = columns_of(fit, lights, kDiscSamples, 1);
-        const LightScore score = fit.score_at(columns, 1, kLuminance, set.score.ambient_ratio);
-        fit.losses(columns, 1, kLuminance, score, loss, weight);
-        double sum = 0.0, total = 1e-12;
-        for (std::size_t i = 0; i < loss.size(); ++i) {
-            loss[i] *= weight[i];
-            sum += loss[i];
-            total += weight[i];
-        }
-        return sum / total;
-    };
-    std::vector<double> plus, minus, unused;
-    const double centre = evaluate(Vector::Zero(), unused);
-    double total_weight = 0.0;
-    for (const double w : weight) total_weight += w;
-
-    Matrix hessian = Matrix::Zero();
-    std::map<int, Vector> block_sum;
-    Vector up, down;
-    for (int a = 0; a < kCount; ++a) {
-        const Vector step = steps[a] * Vector::Unit(a);
-        up[a] = evaluate(step, plus);
-        down[a] = evaluate(-step, minus);
-        hessian(a, a) = (up[a] + down[a] - 2.0 * centre) / (steps[a] * steps[a]);
-        for (std::size_t i = 0; i < plus.size(); ++i) {
-            auto [entry, is_new] = block_sum.try_emplace(fit.samples().block[i], Vector::Zero());
-            entry->second[a] += (plus[i] - minus[i]) / (2.0 * steps[a]);
-        }
-    }
-    for (int a = 0; a < kCount; ++a) {
-        for (int b = a + 1; b < kCount; ++b) {
-            const Vector step = steps[a] * Vector::Unit(a) + steps[b] * Vector::Unit(b);
-            const double both = evaluate(step, unused) + evaluate(-step, unused);
-            hessian(a, b) = hessian(b, a) =
-                (both - up[a] - down[a] - up[b] - down[b] + 2.0 * centre) /
-                (2.0 * steps[a] * steps[b]);
-        }
-    }
-    LightDeviation deviation;
-    const PolarLight& light = set.lights[k];
-    deviation.is_at_bound =
-        light.distance_m < kBoundMargin * kMinDistancePerRadius * fit.samples().scene_radius_m ||
-        light.direction.dot(fit.samples().plane.normal) < kBoundMargin * kMinElevationSine;
-    deviation.is_identifiable = !is_flat(hessian, 0) && !is_flat(hessian, 1);
-    Matrix meat = Matrix::Zero();
-    for (const auto& [block, sum] : block_sum) {
-        const Vector s = sum / total_weight;
-        meat += s * s.transpose();
-    }
-    // Before any picture distance and radius are known within a factor or two, which keeps a
-    // penumbra that says nothing of the radius from making the direction vague as well. The loss
-    // becomes a likelihood by the scale at which curvature and scatter of the angles agree.
-    const double scale = (hessian(0, 0) + hessian(1, 1)) / std::max(meat(0, 0) + meat(1, 1), 1e-30);
-    if (deviation.is_identifiable)
-        for (const int a : {2, 3}) {
-            const double prior = 1.0 / (scale * kUnknownLog * kUnknownLog);
-            hessian(a, a) = std::max(hessian(a, a), 0.0) + prior;
-            meat(a, a) += prior / scale;
-        }
-    const Matrix inverse = inverse_of(hessian);
-    const Matrix covariance = inverse * meat * inverse;
-    const auto deviation_of = [&](int a) {
-        return deviation.is_identifiable ? std::sqrt(std::max(0.0, covariance(a, a))) : kUnknownLog;
-    };
-    deviation.direction_rad = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
-    deviation.log_distance = deviation_of(2);
-    deviation.log_radius = deviation_of(3);
-    return deviation;
 }
 
 }  // namespace vitrine

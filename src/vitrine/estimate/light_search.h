@@ -30,6 +30,8 @@ struct HemisphereGrid {
 /// `count` nearly even directions above the plane; distances around the scene's diameter.
 HemisphereGrid make_hemisphere(const ScanSamples& samples, int count);
 
+/// Turned by two angles about axes across it, up to the second order.
+Vec3 tilted(const Vec3& direction, double x, double y);
 TrialLight to_trial(const PolarLight& light, const Vec3& reference_point_m);
 LightColumns columns_of(const LightFit& fit, std::span<const PolarLight> lights, int disc_samples,
                         int stride);
@@ -43,6 +45,8 @@ std::vector<LightSet> search_single(const LightFit& fit, const HemisphereGrid& g
 std::vector<LightSet> search_pairs(const LightFit& fit, const HemisphereGrid& grid,
                                    std::span<const LightSet> firsts, int stride);
 
+/// Whether it lies as near or as low as lights are looked for.
+bool is_at_bound(const LightFit& fit, const PolarLight& light);
 /// Whether one stands beyond where distances are told apart.
 bool has_distant(const LightFit& fit, const LightSet& set);
 /// The set refined with light `k` first put at a distance, in radii of the scene, with the same
@@ -64,16 +68,5 @@ struct RefineOptions {
 };
 /// Simplex search over direction, log distance, log radius and weight of all lights together.
 LightSet refine_lights(const LightFit& fit, const LightSet& start, const RefineOptions& options);
-
-struct LightDeviation {
-    double direction_rad = 0.0;  ///< root of the mean variance of the two angles
-    double log_distance = 0.0;
-    double log_radius = 0.0;
-    bool is_at_bound = false;      ///< as near or as low as lights are looked for
-    bool is_identifiable = false;  ///< the cost curves upward in both angles
-};
-/// Standard deviations of light `k` from block sums of the loss (sandwich estimator, the limit of
-/// a block bootstrap with many resamples), by differences over about one degree.
-LightDeviation light_deviation(const LightFit& fit, const LightSet& set, std::size_t k);
 
 }  // namespace vitrine

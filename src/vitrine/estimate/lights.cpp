@@ -120,8 +120,9 @@ LightEstimate estimate_lights(const Scene& scene, std::span<const RgbdFrame> fra
     estimate.error_refined = set.score.cost;
     estimate.residual_rms = set.score.residual_rms;
     estimate.outcome = Outcome::Converged;
+    const std::vector<LightDeviation> deviations = light_deviations(fit, set);
     for (std::size_t k = 0; k < set.lights.size(); ++k) {
-        estimate.lights.push_back(with_deviations(fit, set, k, is_distant[k] != 0));
+        estimate.lights.push_back(with_deviations(fit, set, k, deviations[k], is_distant[k] != 0));
         const FittedLight& fitted = estimate.lights.back();
         if (fitted.outcome == Outcome::Converged) continue;
         estimate.outcome = fitted.outcome;

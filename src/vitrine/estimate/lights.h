@@ -33,6 +33,7 @@ struct FittedLight {
     double stddev_distance_m = 0.0;
     double stddev_radius_m = 0.0;
     double stddev_intensity_ratio = 0.0;         ///< of the intensity, relative
+    double stddev_irradiance_ratio = 0.0;        ///< of intensity over distance squared
     Outcome outcome = Outcome::NotIdentifiable;  ///< of the direction
     std::string reason;
     bool is_distant = false;  ///< its distance is not identifiable: only the direction counts

@@ -127,6 +127,28 @@ TEST(EstimateLights, AWeakSecondLampIsFoundOnATextureTwiceItsShadow) {
     EXPECT_LT(error_deg(e.lights[is_a_first ? 1 : 0], b), 6.0);
 }
 
+TEST(EstimateLights, WhatOneLampMayTakeFromAnotherIsInDoubt) {
+    const DiscLight strong = aimed(Vec3(0.45, -0.35, 0.6), 0.03, 3.0f);
+    const DiscLight weak = aimed(Vec3(-0.6, -0.2, 0.7), 0.03, 1.5f);
+    LightOptions options = small_options();
+    options.samples.count = 1000;
+    const auto fitted = [&](const std::vector<DiscLight>& lamps, float texture) {
+        const World world = make_world(lamps, 0.02f, 1e9f, texture);
+        options.start = lamps;
+        return estimate_lights(world.scene, world.frames, 1e9, options).lights;
+    };
+    const std::vector<FittedLight> alone = fitted({strong}, 0.3f);
+    const std::vector<FittedLight> plain = fitted({strong, weak}, 0.0f);
+    const std::vector<FittedLight> painted = fitted({strong, weak}, 0.3f);
+    ASSERT_EQ(painted.size(), 2u);
+    EXPECT_GT(painted[0].stddev_irradiance_ratio, alone[0].stddev_irradiance_ratio);
+    EXPECT_GT(painted[1].stddev_intensity_ratio, painted[0].stddev_intensity_ratio);
+    for (std::size_t k = 0; k < 2; ++k) {
+        EXPECT_GT(painted[k].stddev_intensity_ratio, plain[k].stddev_intensity_ratio);
+        EXPECT_LT(painted[k].stddev_intensity_ratio, 0.5);
+    }
+}
+
 TEST(EstimateLights, ARivalMakesThemAmbiguousAndIsKept) {
     LightEstimate e;
     e.outcome = Outcome::Converged;

@@ -1,6 +1,5 @@
 #include "estimate/object_context.h"
 
-#include <algorithm>
 #include <cmath>
 
 namespace vitrine {
@@ -14,10 +13,8 @@ double stddev_of_irradiance(const LightEstimate& lights) {
         const double distance = (fitted.light.position_m - lights.reference_point_m).norm();
         const double irradiance =
             luminance(fitted.light.intensity_w_per_sr) / (distance * distance);
-        const double shared = 2.0 * fitted.stddev_distance_m / distance;
-        const double ratio2 = fitted.stddev_intensity_ratio * fitted.stddev_intensity_ratio;
         sum += irradiance;
-        square += irradiance * irradiance * std::max(0.0, ratio2 - shared * shared);
+        square += std::pow(irradiance * fitted.stddev_irradiance_ratio, 2);
     }
     return sum > 0.0 ? std::sqrt(square) / sum : 0.0;
 }
