@@ -215,11 +215,8 @@ DifferentialImage DifferentialRenderer::render(const Camera& camera,
         for (int band = 0; band < height; band += kBand) {
             const auto rows = static_cast<std::size_t>(std::min(kBand, height - band));
             parallel_for(rows, 1, [&](std::size_t row) {
-                const int y = band + static_cast<int>(row);
-                for (int x = 0; x < width; ++x) {
-                    renderer.add_samples(x, y, plan.sharp(x, y), plan.soft(x, y), light_samples,
-                                         sums(x, y));
-                }
+                renderer.add_samples(band + static_cast<int>(row), plan.sharp, plan.soft,
+                                     light_samples, sums);
             });
             step.update(static_cast<double>(band + static_cast<int>(rows)) / height, "insert");
         }

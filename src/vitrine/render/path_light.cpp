@@ -5,14 +5,11 @@
 namespace vitrine {
 namespace {
 
-/// Shadow rays that are traced together.
-constexpr std::size_t kPacket = 4;
-
 float balance(float a, float b) { return a + b > 0 ? a / (a + b) : 0.0f; }
 
 }  // namespace
 
-void PathTracer::add_emission(const State& state, float distance, Sink& sink) const {
+void PathTracer::add_emission(const State& state, float distance, Sink sink) const {
     if (state.is_covered) return;
     const LightSampler& lights = scene_.lights();
     for (std::size_t i = 0; i < lights.count(); ++i) {
@@ -24,11 +21,11 @@ void PathTracer::add_emission(const State& state, float distance, Sink& sink) co
             weight =
                 balance(state.pdf, lights.pdf(i, state.receiver, state.direction, hit->distance));
         }
-        sink.add(state, state.layer, state.throughput * hit->radiance * weight, state.views);
+        sink.add(state, state.layer, state.throughput * hit->radiance * weight);
     }
 }
 
-void PathTracer::add_environment(const State& state, Sink& sink) const {
+void PathTracer::add_environment(const State& state, Sink sink) const {
     const LightSampler& lights = scene_.lights();
     Rgb radiance =
         options_.direct_light_only && state.has_receiver ? Rgb(Rgb::Zero()) : lights.ambient();
@@ -43,35 +40,35 @@ void PathTracer::add_environment(const State& state, Sink& sink) const {
     }
     // An environment seen from the first surface is direct light, whatever its layer says by now.
     const Layer layer = state.is_from_first && !state.is_layer_fixed ? Layer::Shadow : state.layer;
-    sink.add(state, layer, state.throughput * radiance, state.views);
+    sink.add(state, layer, state.throughput * radiance);
 }
 
-void PathTracer::find_free(std::span<Ray> rays, std::uint32_t views, std::uint32_t* free) const {
-    const auto clear = [&](std::uint32_t mask, std::uint32_t its_views) {
-        for (Ray& ray : rays) ray.mask = mask;
-        if (rays.size() == 1) {
-            if (!free[0] && !scene_.is_occluded(rays.front())) free[0] = its_views;
-            return;
+void PathTracer::add_shadows(Wave& wave) const {
+    if (wave.shadows.empty()) return;
+    scene_.occluded(wave.shadow_rays, wave.hidden);
+    for (std::size_t i = 0; i < wave.shadows.size(); ++i) {
+        const ShadowRay& shadow = wave.shadows[i];
+        std::uint32_t lit = shadow.views;
+        if (wave.hidden[i]) {
+            if (shadow.views != kAllParts) continue;
+            // What a virtual part hides may lie open in the scene without.
+            Ray ray = wave.shadow_rays[i];
+            ray.mask = lit = kRealParts;
+            if (scene_.is_occluded(ray)) continue;
         }
-        std::vector<std::uint8_t> hidden;
-        scene_.occluded(rays, hidden);
-        for (std::size_t i = 0; i < rays.size(); ++i) {
-            if (!free[i] && !hidden[i]) free[i] = its_views;
-        }
-    };
-    std::fill(free, free + rays.size(), 0u);
-    clear(mask_of(views), views);
-    if (views != kAllParts) return;
-    // What a virtual part hides may lie open in the scene without.
-    if (std::find(free, free + rays.size(), 0u) != free + rays.size()) {
-        clear(kRealParts, kRealParts);
+        Sink sink{wave.results[shadow.path]};
+        if (lit != shadow.path_views) sink.part();
+        sink.add(shadow.is_soft, shadow.layer, shadow.light, lit);
     }
+    wave.shadows.clear();
+    wave.shadow_rays.clear();
 }
 
 void PathTracer::add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                            const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
-                            int light_samples, Sink& sink) const {
+                            const Frame& frame, const Vec3f& wo, int light_samples,
+                            Wave& wave) const {
     const LightSampler& lights = scene_.lights();
+    const PathSampler& sampler = wave.task(state).sample.sampler;
     if (lights.count() == 0) return;
     // All lights at the surface seen; one of them, by turns of chance, at those behind it.
     const bool takes_all = state.is_first_receiver || lights.count() == 1;
@@ -89,28 +86,18 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
         const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
         const int count = lights.needs_position(i) ? light_samples : 1;
         const float scale = boost / static_cast<float>(count);
-        for (int begin_k = 0; begin_k < count; begin_k += static_cast<int>(kPacket)) {
-            std::array<Ray, kPacket> rays;
-            std::array<Rgb, kPacket> light;
-            std::array<std::uint32_t, kPacket> lit;
-            std::size_t found = 0;
-            for (int k = begin_k; k < std::min(count, begin_k + static_cast<int>(kPacket)); ++k) {
-                Vec2f u(0.5f, 0.5f);
-                if (lights.needs_position(i)) u = sampler.pair(state.depth, use, count, k);
-                const auto s = lights.sample(i, origin, u);
-                if (!s) continue;
-                const Vec3f wi = frame.to_local(s->direction);
-                if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
-                const Rgb value = direct_value(state, bsdf, wo, wi, s->pdf);
-                if (!(value > 0).any()) continue;
-                rays[found] = {origin, s->direction, 0.0f, s->distance * (1 - 1e-4f)};
-                light[found++] = state.throughput * value * s->radiance_over_pdf * (scale * wi.z());
-            }
-            if (found == 0) continue;
-            find_free(std::span(rays).first(found), state.views, lit.data());
-            for (std::size_t k = 0; k < found; ++k) {
-                if (lit[k] != 0) sink.add_in(lit[k], state, state.layer, light[k]);
-            }
+        for (int k = 0; k < count; ++k) {
+            Vec2f u(0.5f, 0.5f);
+            if (lights.needs_position(i)) u = sampler.pair(state.depth, use, count, k);
+            const auto s = lights.sample(i, origin, u);
+            if (!s) continue;
+            const Vec3f wi = frame.to_local(s->direction);
+            if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
+            const Rgb value = direct_value(state, bsdf, wo, wi, s->pdf);
+            if (!(value > 0).any()) continue;
+            wave.add_shadow(state, state.views, state.layer,
+                            state.throughput * value * s->radiance_over_pdf * (scale * wi.z()),
+                            {origin, s->direction, 0.0f, s->distance * (1 - 1e-4f)});
         }
     }
 }
@@ -135,7 +122,7 @@ Rgb PathTracer::direct_value(const State& state, const Bsdf& bsdf, const Vec3f& 
 }
 
 void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                              const Frame& frame, const Vec3f& wo, Sink& sink) const {
+                              const Frame& frame, const Vec3f& wo, Sink sink) const {
     if (!caustics_ || caustics_->empty()) return;
     if (state.is_diffuse_segment && (point.position - state.receiver).norm() >= caustics_->near_m) {
         return;  // known from the secondary lights
@@ -185,7 +172,7 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
         return state.throughput * (sums.irradiance * value + sums.glossy);
     };
     if (!is_different) {
-        sink.add(state, layer, reflected(first), state.views);
+        sink.add(state, layer, reflected(first));
         return;
     }
     sink.add_in(kVirtualParts, state, layer, reflected(first));
@@ -193,7 +180,7 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
 }
 
 void PathTracer::add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                              const Vec3f& wo, Sink& sink) const {
+                              const Vec3f& wo, Sink sink) const {
     const auto* face = std::get_if<TranslucentBsdf>(&bsdf);
     if (!face || !translucent_) return;
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
@@ -203,7 +190,7 @@ void PathTracer::add_exitance(const State& state, const ShadingPoint& point, con
         return share * translucent_->exitance(scene_, point, mask_of(views));
     };
     if (state.views != kAllParts || !translucent_->is_touched(point.part)) {
-        sink.add(state, layer, exitance(state.views), state.views);
+        sink.add(state, layer, exitance(state.views));
         return;
     }
     sink.add_in(kVirtualParts, state, layer, exitance(kVirtualParts));
@@ -211,9 +198,9 @@ void PathTracer::add_exitance(const State& state, const ShadingPoint& point, con
 }
 
 void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                               const PathSampler& sampler, Sink& sink) const {
+                               Wave& wave) const {
     if (!caustics_ || caustics_->secondary_choice.empty()) return;
-    float u = sampler.number(state.depth, kSecondaryUse);
+    float u = wave.task(state).sample.sampler.number(state.depth, kSecondaryUse);
     const std::size_t index = caustics_->secondary_choice.sample(u);
     const SecondaryLight& light = caustics_->secondary[index];
     const std::uint32_t views = light.views & state.views;
@@ -228,14 +215,11 @@ void PathTracer::add_secondary(const State& state, const ShadingPoint& point, co
     if (cos_here <= 0 || cos_there <= 0 || direction.dot(point.geometric_normal) <= 0) return;
     const Rgb value = eval_lobe(bsdf, Lobe::Diffuse, Vec3f(0, 0, 1), Vec3f(0, 0, 1));
     if (!(value > 0).any()) return;
-    Ray ray{origin, direction, 0.0f, distance * (1 - 1e-4f)};
-    std::uint32_t lit = 0;
-    find_free(std::span(&ray, 1), views, &lit);
-    if (lit == 0) return;
     const auto probability = static_cast<float>(caustics_->secondary_choice.probability(index));
     const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
-    sink.add_in(lit, state, layer, state.throughput * value * light.flux * geometry);
+    wave.add_shadow(state, views, layer, state.throughput * value * light.flux * geometry,
+                    {origin, direction, 0.0f, distance * (1 - 1e-4f)});
 }
 
 }  // namespace vitrine

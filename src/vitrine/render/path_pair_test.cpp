@@ -50,10 +50,10 @@ void expect_two_paths(const Material& material) {
                               -0.25f + 0.0125f * static_cast<float>(y), 0.01f);
             const Vec3f direction = (place - eye).normalized();
             const PathSampler sampler(stream_key(7, unsigned(x), unsigned(y)), 0);
-            const PathWish wish{true, x % 3 == 0 ? 5 : 1, nullptr};
-            const PathPair pair = both.trace_both(eye, direction, sampler, wish);
-            EXPECT_TRUE(same(pair.with(), both.trace(eye, direction, sampler, wish)));
-            EXPECT_TRUE(same(pair.without(), alone.trace(eye, direction, sampler, wish)));
+            const PathTask task{{sampler, direction}, {true, x % 3 == 0 ? 5 : 1}};
+            const PathPair pair = both.trace_both(eye, task);
+            EXPECT_TRUE(same(pair.with(), both.trace(eye, task)));
+            EXPECT_TRUE(same(pair.without(), alone.trace(eye, task)));
             EXPECT_TRUE(pair.is_touched() || same(pair.with(), pair.without()));
             touched += pair.is_touched() ? 1 : 0;
             hidden += pair.with().first_part == 3 ? 1 : 0;
@@ -71,17 +71,26 @@ TEST(PathPair, IsTwoPathsBehindADiffuseBox) {
 TEST(PathPair, IsTwoPathsBehindAGlassBox) { expect_two_paths(Dielectric{1.4, Rgb::Constant(5)}); }
 TEST(PathPair, IsTwoPathsBehindAMirror) { expect_two_paths(Mirror{Rgb::Constant(0.8f)}); }
 
-TEST(PathPair, KnownFirstHitChangesNothing) {
-    const RenderScene scene(world());
+TEST(PathPair, TogetherAsOneByOne) {
+    Scene whole = world();
+    whole.parts.push_back(make_part(make_box(Vec3(0.05, 0.05, 0.05), Vec3(0.06, -0.08, 0.0255)),
+                                    Dielectric{1.4, Rgb::Constant(5)}, true));
+    const RenderScene scene(whole);
     const PathTracer tracer(scene, nullptr);
     const Vec3f eye(0.1f, -0.45f, 0.3f);
-    for (int k = 0; k < 200; ++k) {
-        const Vec3f direction =
-            (Vec3f(-0.2f + 0.002f * static_cast<float>(k), 0.0f, 0.05f) - eye).normalized();
-        const PathSampler sampler(stream_key(9, unsigned(k)), 3);
-        const Hit hit = scene.closest({eye, direction, 0.0f, 1e30f, kAllParts});
-        EXPECT_TRUE(same(tracer.trace(eye, direction, sampler, {true, 1, &hit}),
-                         tracer.trace(eye, direction, sampler)));
+    std::vector<PathTask> tasks;
+    for (int k = 0; k < 400; ++k) {
+        const Vec3f place(-0.2f + 0.001f * static_cast<float>(k), 0.01f * float(k % 7), 0.05f);
+        tasks.push_back(
+            {{PathSampler(stream_key(9, unsigned(k)), 3), (place - eye).normalized()}, {}});
+    }
+    std::vector<PathPair> together(tasks.size());
+    tracer.trace_both(eye, tasks, together);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+        const PathPair alone = tracer.trace_both(eye, tasks[i]);
+        EXPECT_TRUE(same(together[i].with(), alone.with()));
+        EXPECT_TRUE(same(together[i].without(), alone.without()));
+        EXPECT_EQ(together[i].is_touched(), alone.is_touched());
     }
 }
 

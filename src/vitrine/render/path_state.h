@@ -1,8 +1,10 @@
-// render/path_state.h: a path under way, and where its contributions go. For the files of
+// render/path_state.h: paths under way, and where their contributions go. For the files of
 // `PathTracer` alone.
 #pragma once
 
 #include "render/path_tracer.h"
+
+#include <vector>
 
 namespace vitrine {
 
@@ -16,6 +18,7 @@ constexpr int kLightUse = 6;  // and one more per light, eight at most
 constexpr int kSecondaryUse = 15;
 
 struct PathTracer::State {
+    std::uint32_t path = 0;  // whose task and result
     Vec3f origin, direction;
     Rgb throughput = Rgb::Ones();
     Media media;
@@ -34,46 +37,83 @@ struct PathTracer::State {
     float pdf = 0;  // of `direction` at the last receiver; 0 for single directions
     Vec3f receiver = Vec3f::Zero();
     std::uint32_t views = kVirtualParts;  // scenes whose path this is
-    bool is_fresh = true;                 // the camera ray
 };
 
-/// Where contributions go: all to the first result until the two scenes differ.
+/// Where the contributions of a path go: all to the first result until the two scenes differ.
 struct PathTracer::Sink {
-    PathResult& with;
-    PathResult& without;
-    bool is_touched = false;
+    PathPair& pair;
 
     /// What comes now differs between the scenes.
     void part() {
-        if (is_touched) return;
-        without = with;
-        is_touched = true;
+        if (pair.is_touched_) return;
+        pair.without_ = pair.with_;
+        pair.is_touched_ = true;
     }
     /// Calls `body(result)` for those of the scenes `views`.
     template <typename Body>
     void each(std::uint32_t views, const Body& body) {
-        if (!is_touched || (views & kVirtualParts)) body(with);
-        if (is_touched && (views & kRealParts)) body(without);
+        if (!pair.is_touched_ || (views & kVirtualParts)) body(pair.with_);
+        if (pair.is_touched_ && (views & kRealParts)) body(pair.without_);
     }
-    void add(const State& state, Layer layer, const Rgb& radiance, std::uint32_t views) {
+    void add(bool is_soft, Layer layer, const Rgb& radiance, std::uint32_t views) {
         each(views, [&](PathResult& result) {
-            if (!state.is_soft) {
+            if (!is_soft) {
                 result.layers[static_cast<std::size_t>(layer)] += radiance;
             } else {
                 (layer == Layer::Shadow ? result.soft.shadow : result.soft.diffuse) += radiance;
             }
         });
     }
+    void add(const State& state, Layer layer, const Rgb& radiance) {
+        add(state.is_soft, layer, radiance, state.views);
+    }
     /// One that is there in the scenes `views` alone, of those of the path.
     void add_in(std::uint32_t views, const State& state, Layer layer, const Rgb& radiance) {
         if (views != state.views) part();
-        add(state, layer, radiance, views);
+        add(state.is_soft, layer, radiance, views);
     }
+};
+
+/// Light that arrives if nothing is in its way.
+struct PathTracer::ShadowRay {
+    Rgb light;
+    std::uint32_t path, path_views;
+    std::uint32_t views;  // scenes, of those of the path, in which the light is there
+    Layer layer;
+    bool is_soft;
+};
+
+/// Paths that go on side by side, one surface at a time: rays are sent one after the other, with
+/// nothing in between that drives Embree's data out of the nearest caches.
+struct PathTracer::Wave {
+    Wave(std::span<const PathTask> its_tasks, std::span<PathPair> its_results)
+        : tasks(its_tasks), results(its_results) {}
+
+    std::span<const PathTask> tasks;
+    std::span<PathPair> results;
+    std::vector<State> states, next;
+    std::vector<Ray> rays;
+    std::vector<Hit> hits;
+    std::vector<ShadowRay> shadows;
+    std::vector<Ray> shadow_rays;  // of `shadows`
+    std::vector<std::uint8_t> hidden;
+
+    const PathTask& task(const State& state) const { return tasks[state.path]; }
+    Sink sink(const State& state) const { return {results[state.path]}; }
+    void add_shadow(const State& state, std::uint32_t views, Layer layer, const Rgb& light,
+                    Ray ray);
 };
 
 /// What rays of a path meet that belongs to the scenes `views`, see PathTracer::entering.
 inline std::uint32_t mask_of(std::uint32_t views) {
     return views & kVirtualParts ? kAllParts : kRealParts;
+}
+
+inline void PathTracer::Wave::add_shadow(const State& state, std::uint32_t views, Layer layer,
+                                         const Rgb& light, Ray ray) {
+    ray.mask = mask_of(views);
+    shadow_rays.push_back(ray);
+    shadows.push_back({light, state.path, state.views, views, layer, state.is_soft});
 }
 
 }  // namespace vitrine

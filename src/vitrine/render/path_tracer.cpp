@@ -2,7 +2,6 @@
 
 #include "render/interface.h"
 #include "render/path_state.h"
-#include "render/small_stack.h"
 
 namespace vitrine {
 namespace {
@@ -10,12 +9,14 @@ namespace {
 /// A branch of a split ray fainter than this is left to chance.
 constexpr float kMinSplitShare = 0.01f;
 
-/// Branches that may wait; one place is kept for the path of the scene without virtual parts.
-constexpr int kMaxPending = 32;
-
 }  // namespace
 
-struct PathTracer::Pending : SmallStack<State, kMaxPending + 1> {};
+CameraRays::CameraRays(const Camera& camera) {
+    const Mat3 world_from_camera = camera.cam_from_world.rotation.transpose();
+    right_ = (world_from_camera.col(0) / camera.fx).cast<float>();
+    down_ = (world_from_camera.col(1) / camera.fy).cast<float>();
+    corner_ = (world_from_camera * camera.ray_in_camera(0, 0)).cast<float>();
+}
 
 PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
                        const TranslucentLight* translucent)
@@ -25,140 +26,169 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
       translucent_(translucent),
       has_virtual_(scene.has_virtual()) {}
 
-PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
-                             const PathSampler& sampler, const PathWish& wish) const {
-    PathResult result;
-    Sink sink{result, result};
-    State first;
-    first.origin = origin;
-    first.direction = direction;
-    finish(first, sampler, wish, sink);
-    return result;
+PathResult PathTracer::trace(const Vec3f& origin, const PathTask& task) const {
+    PathPair pair;
+    Wave wave(std::span(&task, 1), std::span(&pair, 1));
+    start(origin, kVirtualParts, wave);
+    return pair.with_;
 }
 
-PathPair PathTracer::trace_both(const Vec3f& origin, const Vec3f& direction,
-                                const PathSampler& sampler, const PathWish& wish) const {
+PathPair PathTracer::trace_both(const Vec3f& origin, const PathTask& task) const {
     PathPair pair;
-    Sink sink{pair.with_, pair.without_};
-    State first;
-    first.origin = origin;
-    first.direction = direction;
-    first.views = has_virtual_ ? kAllParts : kVirtualParts;
-    finish(first, sampler, wish, sink);
-    pair.is_touched_ = sink.is_touched;
+    trace_both(origin, std::span(&task, 1), std::span(&pair, 1));
     return pair;
 }
 
-void PathTracer::finish(const State& first, const PathSampler& sampler, const PathWish& wish,
-                        Sink& sink) const {
-    Pending pending;
-    follow(first, pending, sampler, wish, sink);
-    while (!pending.empty()) follow(pending.pop(), pending, sampler, wish, sink);
+void PathTracer::trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
+                            std::span<PathPair> results) const {
+    Wave wave(tasks, results);
+    start(origin, has_virtual_ ? kAllParts : kVirtualParts, wave);
 }
 
-PathPair PathTracer::entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
-                              std::uint32_t views) const {
-    PathPair pair;
+void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) const {
+    State first;
+    first.origin = origin;
+    first.views = views;
+    for (std::size_t i = 0; i < wave.tasks.size(); ++i) {
+        wave.results[i] = PathPair();
+        first.path = static_cast<std::uint32_t>(i);
+        first.direction = wave.tasks[i].sample.direction;
+        wave.states.push_back(first);
+        wave.rays.push_back({origin, first.direction, 0.0f, 1e30f, mask_of(views)});
+    }
+    // Neighbours' camera rays run side by side, which Embree's packets are made for.
+    wave.hits.resize(wave.rays.size());
+    scene_.closest(wave.rays, wave.hits);
+    finish(wave);
+}
+
+void PathTracer::finish(Wave& wave) const {
+    while (!wave.states.empty()) {
+        wave.next.clear();
+        const std::size_t count = wave.states.size();
+        for (std::size_t i = 0; i < count; ++i) {
+            State& state = wave.states[i];
+            const Hit& hit = wave.hits[i];
+            if (state.views == kAllParts && hit.is_hit() && scene_.is_virtual(hit.part)) {
+                wave.sink(state).part();
+                State real = state;
+                real.views = kRealParts;
+                state.views = kVirtualParts;
+                step(state, hit, wave);
+                step(real, closest(real), wave);
+            } else {
+                step(state, hit, wave);
+            }
+        }
+        add_shadows(wave);
+        wave.states.swap(wave.next);
+        find_hits(wave);
+    }
+}
+
+Hit PathTracer::closest(const State& state) const {
+    return scene_.closest({state.origin, state.direction, 0.0f, 1e30f, mask_of(state.views)});
+}
+
+void PathTracer::find_hits(Wave& wave) const {
+    wave.hits.resize(wave.states.size());
+    for (std::size_t i = 0; i < wave.states.size(); ++i) wave.hits[i] = closest(wave.states[i]);
+}
+
+void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const PathTask> tasks,
+                          std::uint32_t views, std::span<PathPair> results) const {
+    Wave wave(tasks, results);
     const bool is_in_one = views == kVirtualParts || views == kRealParts;
-    Sink sink{pair.with_, pair.without_, is_in_one};
-    State state;
-    state.depth = 1;
-    state.is_fresh = false;
-    state.views = views == kAllParts && !has_virtual_ ? kVirtualParts : views;
     const Bsdf bsdf = EnteringBsdf{eta};
     const Frame frame(point.shading_normal);
     const Vec3f wo(0, 0, 1);
-    if (views != 0) {
-        add_direct(state, point, bsdf, frame, wo, sampler, 1, sink);
-        if (!options_.direct_light_only) {
-            add_secondary(state, point, bsdf, sampler, sink);
-            if (scatter(state, point, bsdf, frame, wo, sampler)) {
-                finish(state, sampler, {}, sink);
-            }
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+        results[i] = PathPair();
+        results[i].is_touched_ = is_in_one;
+        if (views == 0) continue;
+        State state;
+        state.path = static_cast<std::uint32_t>(i);
+        state.depth = 1;
+        state.views = views == kAllParts && !has_virtual_ ? kVirtualParts : views;
+        add_direct(state, point, bsdf, frame, wo, 1, wave);
+        if (options_.direct_light_only) continue;
+        add_secondary(state, point, bsdf, wave);
+        if (scatter(state, point, bsdf, frame, wo, tasks[i].sample.sampler)) {
+            wave.states.push_back(state);
         }
     }
-    pair.is_touched_ = sink.is_touched;
-    return pair;
+    add_shadows(wave);
+    find_hits(wave);
+    finish(wave);
 }
 
-void PathTracer::follow(State state, Pending& pending, const PathSampler& sampler,
-                        const PathWish& wish, Sink& sink) const {
-    while (true) {
-        const Hit hit = wish.first && state.is_fresh
-                            ? *wish.first
-                            : scene_.closest({state.origin, state.direction, 0.0f, 1e30f,
-                                              mask_of(state.views)});
-        state.is_fresh = false;
-        if (state.views == kAllParts && hit.is_hit() && scene_.is_virtual(hit.part)) {
-            sink.part();
-            state.views = kRealParts;
-            pending.push(state);
-            state.views = kVirtualParts;
-        }
-        state.throughput *= scene_.transmittance(state.media, hit.is_hit() ? hit.distance : 1e30f);
-        add_emission(state, hit.is_hit() ? hit.distance : 1e30f, sink);
-        if (!hit.is_hit()) {
-            add_environment(state, sink);
-            return;
-        }
-        if (state.depth == 0) {
-            sink.each(state.views, [&](PathResult& result) { result.first_part = hit.part; });
-        }
-        if (state.is_soft) {
-            sink.each(state.views, [&](PathResult& result) {
-                if (result.soft.hit_distance == 0) result.soft.hit_distance = hit.distance;
-            });
-        }
-        const ShadingPoint point = scene_.surface(hit, state.direction);
-        ++state.depth;
-        if (scene_.dielectric(hit.part)) {
-            if (++state.specular_bounces > options_.max_specular_bounces) return;
-            if (!pass_interface(state, point, pending, sampler)) return;
-            continue;
-        }
-        const Bsdf bsdf = scene_.bsdf(point, hit);
-        if (is_smooth(bsdf)) {
-            if (++state.specular_bounces > options_.max_specular_bounces) return;
-            state.throughput *= std::get<MirrorBsdf>(bsdf).reflectance;
-            state.direction = mirror_direction(point, state.direction);
-            state.origin = scene_.leave(point, state.direction);
-            state.pdf = 0;
-            state.is_diffuse_segment = false;
-            state.is_covered |= state.has_receiver && caustics_;
-            if (!state.is_layer_fixed && !state.has_receiver) {
-                state.layer = Layer::Reflection;
-                state.is_layer_fixed = true;
-            }
-            continue;
-        }
-        const Frame frame(point.shading_normal);
-        Vec3f wo = frame.to_local(-state.direction);
-        // The rounded surface may face away where the facet does not: keep to the horizon.
-        if (wo.z() <= 0) wo = Vec3f(wo.x(), wo.y(), 1e-4f).normalized();
-        if (!state.is_layer_fixed) {
-            state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
-        }
-        add_exitance(state, point, bsdf, wo, sink);
-        add_direct(state, point, bsdf, frame, wo, sampler,
-                   state.has_receiver ? 1 : wish.light_samples, sink);
-        add_caustics(state, point, bsdf, frame, wo, sink);
-        if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
-            return;
-        }
-        const auto* plain = std::get_if<DiffuseBsdf>(&bsdf);
-        if (plain && !state.has_receiver && !state.is_layer_fixed) {
-            sink.each(state.views, [&](PathResult& result) {
-                result.soft.is_present = true;
-                result.soft.albedo = plain->albedo;
-                result.soft.position = point.position;
-                result.soft.normal = point.shading_normal;
-            });
-            if (!wish.finds_soft) return;
-            state.is_soft = true;
-        }
-        add_secondary(state, point, bsdf, sampler, sink);
-        if (!scatter(state, point, bsdf, frame, wo, sampler)) return;
+void PathTracer::step(State& state, const Hit& hit, Wave& wave) const {
+    Sink sink = wave.sink(state);
+    state.throughput *= scene_.transmittance(state.media, hit.is_hit() ? hit.distance : 1e30f);
+    add_emission(state, hit.is_hit() ? hit.distance : 1e30f, sink);
+    if (!hit.is_hit()) {
+        add_environment(state, sink);
+        return;
     }
+    if (state.depth == 0) {
+        sink.each(state.views, [&](PathResult& result) { result.first_part = hit.part; });
+    }
+    if (state.is_soft) {
+        sink.each(state.views, [&](PathResult& result) {
+            if (result.soft.hit_distance == 0) result.soft.hit_distance = hit.distance;
+        });
+    }
+    const ShadingPoint point = scene_.surface(hit, state.direction);
+    ++state.depth;
+    if (scene_.dielectric(hit.part)) {
+        if (++state.specular_bounces > options_.max_specular_bounces) return;
+        pass_interface(state, point, wave);
+        return;
+    }
+    const Bsdf bsdf = scene_.bsdf(point, hit);
+    if (is_smooth(bsdf)) {
+        if (++state.specular_bounces > options_.max_specular_bounces) return;
+        state.throughput *= std::get<MirrorBsdf>(bsdf).reflectance;
+        state.direction = mirror_direction(point, state.direction);
+        state.origin = scene_.leave(point, state.direction);
+        state.pdf = 0;
+        state.is_diffuse_segment = false;
+        state.is_covered |= state.has_receiver && caustics_;
+        if (!state.is_layer_fixed && !state.has_receiver) {
+            state.layer = Layer::Reflection;
+            state.is_layer_fixed = true;
+        }
+        wave.next.push_back(state);
+        return;
+    }
+    const PathSampler& sampler = wave.task(state).sample.sampler;
+    const PathWish& wish = wave.task(state).wish;
+    const Frame frame(point.shading_normal);
+    Vec3f wo = frame.to_local(-state.direction);
+    // The rounded surface may face away where the facet does not: keep to the horizon.
+    if (wo.z() <= 0) wo = Vec3f(wo.x(), wo.y(), 1e-4f).normalized();
+    if (!state.is_layer_fixed) {
+        state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
+    }
+    add_exitance(state, point, bsdf, wo, sink);
+    add_direct(state, point, bsdf, frame, wo, state.has_receiver ? 1 : wish.light_samples, wave);
+    add_caustics(state, point, bsdf, frame, wo, sink);
+    if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
+        return;
+    }
+    const auto* plain = std::get_if<DiffuseBsdf>(&bsdf);
+    if (plain && !state.has_receiver && !state.is_layer_fixed) {
+        sink.each(state.views, [&](PathResult& result) {
+            result.soft.is_present = true;
+            result.soft.albedo = plain->albedo;
+            result.soft.position = point.position;
+            result.soft.normal = point.shading_normal;
+        });
+        if (!wish.finds_soft) return;
+        state.is_soft = true;
+    }
+    add_secondary(state, point, bsdf, wave);
+    if (scatter(state, point, bsdf, frame, wo, sampler)) wave.next.push_back(state);
 }
 
 bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf,
@@ -195,16 +225,15 @@ bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bs
     return true;
 }
 
-bool PathTracer::pass_interface(State& state, const ShadingPoint& point, Pending& pending,
-                                const PathSampler& sampler) const {
+void PathTracer::pass_interface(const State& state, const ShadingPoint& point, Wave& wave) const {
     const InterfaceEvent event = cross_interface(scene_, point, state.direction, state.media);
     State reflected = state, refracted = state;
     refracted.direction = event.refracted;
     refracted.media = event.beyond;
     refracted.origin = scene_.leave(point, refracted.direction);
     if (!event.is_optical) {
-        state = refracted;
-        return true;
+        wave.next.push_back(refracted);
+        return;
     }
     reflected.direction = event.reflected;
     reflected.origin = scene_.leave(point, reflected.direction);
@@ -221,25 +250,24 @@ bool PathTracer::pass_interface(State& state, const ShadingPoint& point, Pending
     const float compression = 1.0f / (event.eta * event.eta);
     const float f = event.reflectance;
     if (f >= 1) {
-        state = reflected;
-        return true;
+        wave.next.push_back(reflected);
+        return;
     }
     const float faint_share = std::min(f, 1 - f) * state.throughput.maxCoeff();
     if (!state.has_receiver && state.specular_bounces <= options_.split_depth &&
-        faint_share > kMinSplitShare && pending.size() < kMaxPending) {
+        faint_share > kMinSplitShare) {
         reflected.throughput *= f;
         refracted.throughput *= (1 - f) * compression;
-        pending.push(reflected);
-        state = refracted;
-        return true;
+        wave.next.push_back(refracted);
+        wave.next.push_back(reflected);
+        return;
     }
-    if (sampler.number(state.depth, kBranchUse) < f) {
-        state = reflected;
+    if (wave.task(state).sample.sampler.number(state.depth, kBranchUse) < f) {
+        wave.next.push_back(reflected);
     } else {
-        state = refracted;
-        state.throughput *= compression;
+        refracted.throughput *= compression;
+        wave.next.push_back(refracted);
     }
-    return true;
 }
 
 }  // namespace vitrine

@@ -68,27 +68,44 @@ class PathPair {
     bool is_touched_ = false;
 };
 
+/// Directions of a camera's rays.
+class CameraRays {
+  public:
+    explicit CameraRays(const Camera& camera);
+    /// Unit, in the world; see `Camera::ray_in_world`.
+    Vec3f through(float u, float v) const {
+        return (corner_ + u * right_ + v * down_).normalized();
+    }
+
+  private:
+    Vec3f corner_, right_, down_;
+};
+
 /// Sample `index` of a pixel: a ray through a place in its square, and the path's random numbers.
 /// Renderers that share a seed share them.
 struct CameraSample {
     PathSampler sampler;
     Vec3f direction;
 };
-inline CameraSample camera_sample(const Camera& camera, std::uint64_t seed, int x, int y,
+inline CameraSample camera_sample(const CameraRays& rays, std::uint64_t seed, int x, int y,
                                   int index) {
     const PathSampler sampler(stream_key(seed, unsigned(x), unsigned(y)),
                               static_cast<std::uint32_t>(index));
     const Vec2f jitter = sampler.pair(0, 0);
-    const Vec3 ray = camera.ray_in_world(x + jitter.x() - 0.5, y + jitter.y() - 0.5);
-    return {sampler, ray.cast<float>()};
+    return {sampler, rays.through(static_cast<float>(x) + (jitter.x() - 0.5f),
+                                  static_cast<float>(y) + (jitter.y() - 0.5f))};
 }
 
 /// What one path is asked for.
 struct PathWish {
     bool finds_soft = true;  ///< false: leaves the soft light out, for a fraction of the cost
     int light_samples = 1;   ///< shadow rays to each lamp with size, from the surface seen
-    /// What the camera ray meets, where it is known: neighbours are found together. May be null.
-    const Hit* first = nullptr;
+};
+
+/// One path from the camera.
+struct PathTask {
+    CameraSample sample;
+    PathWish wish;
 };
 
 class PathTracer {
@@ -99,51 +116,53 @@ class PathTracer {
                const TranslucentLight* translucent = nullptr);
 
     /// In the scene with its virtual parts, if it has any.
-    PathResult trace(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
-                     const PathWish& wish = {}) const;
+    PathResult trace(const Vec3f& origin, const PathTask& task) const;
 
     /// In the scene with its virtual parts and in the one without. What both have in common is
     /// traced once: they part where a ray meets a virtual part, and go on with the same numbers.
-    PathPair trace_both(const Vec3f& origin, const Vec3f& direction, const PathSampler& sampler,
-                        const PathWish& wish = {}) const;
+    PathPair trace_both(const Vec3f& origin, const PathTask& task) const;
+    /// Of many paths: a few hundred together cost about two thirds of what they cost one by one.
+    void trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
+                    std::span<PathPair> results) const;
 
-    /// Irradiance / pi that enters a translucent body at `point` along one path. Photons that land
-    /// on it are left out: they are known one by one.
+    /// Irradiance / pi that enters a translucent body at `point` along each of some paths. Photons
+    /// that land on it are left out: they are known one by one.
+    /// @param tasks whose random numbers count
     /// @param views scenes in which the point lies free: kVirtualParts the one with these, which
     ///     begins here, kRealParts the one without
-    PathPair entering(const ShadingPoint& point, float eta, const PathSampler& sampler,
-                      std::uint32_t views) const;
+    void entering(const ShadingPoint& point, float eta, std::span<const PathTask> tasks,
+                  std::uint32_t views, std::span<PathPair> results) const;
 
   private:
     struct State;
-    struct Pending;
     struct Sink;
-    void follow(State state, Pending& pending, const PathSampler& sampler, const PathWish& wish,
-                Sink& sink) const;
-    void add_emission(const State& state, float distance, Sink& sink) const;
-    void add_environment(const State& state, Sink& sink) const;
+    struct ShadowRay;
+    struct Wave;
+    void start(const Vec3f& origin, std::uint32_t views, Wave& wave) const;
+    /// Follows all paths of the wave to their ends.
+    void finish(Wave& wave) const;
+    Hit closest(const State& state) const;
+    void find_hits(Wave& wave) const;
+    /// What `hit` of the state's ray brings; what goes on from there is added to the wave's next.
+    void step(State& state, const Hit& hit, Wave& wave) const;
+    void add_emission(const State& state, float distance, Sink sink) const;
+    void add_environment(const State& state, Sink sink) const;
     void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                    const Frame& frame, const Vec3f& wo, const PathSampler& sampler,
-                    int light_samples, Sink& sink) const;
+                    const Frame& frame, const Vec3f& wo, int light_samples, Wave& wave) const;
     /// Of the lobes towards a light that was picked with a density (0: a light without size).
     Rgb direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
                      float light_pdf) const;
     void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                      const Frame& frame, const Vec3f& wo, Sink& sink) const;
+                      const Frame& frame, const Vec3f& wo, Sink sink) const;
     void add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                      const Vec3f& wo, Sink& sink) const;
+                      const Vec3f& wo, Sink sink) const;
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                       const PathSampler& sampler, Sink& sink) const;
-    /// Follows the path and all that branches off.
-    void finish(const State& first, const PathSampler& sampler, const PathWish& wish,
-                Sink& sink) const;
+                       Wave& wave) const;
+    /// Light of the wave's shadow rays that arrives.
+    void add_shadows(Wave& wave) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
-    bool pass_interface(State& state, const ShadingPoint& point, Pending& pending,
-                        const PathSampler& sampler) const;
-    /// Of the scenes `views`, those in which nothing is in the way of each ray; sets
-    /// the rays' masks.
-    void find_free(std::span<Ray> rays, std::uint32_t views, std::uint32_t* free) const;
+    void pass_interface(const State& state, const ShadingPoint& point, Wave& wave) const;
 
     const RenderScene& scene_;
     const CausticMaps* caustics_;

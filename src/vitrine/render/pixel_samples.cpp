@@ -1,6 +1,6 @@
 #include "render/pixel_samples.h"
 
-#include <optional>
+#include "render/path_group.h"
 
 namespace vitrine {
 namespace {
@@ -56,46 +56,34 @@ float PixelSums::sharp_variance() const {
 PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMaps>& maps,
                            const TranslucentLight& translucent, const Camera& camera,
                            const PathOptions& paths, std::uint64_t seed)
-    : scene_(scene), camera_(camera), origin_(camera.centre_in_world().cast<float>()), seed_(seed) {
+    : scene_(scene), rays_(camera), origin_(camera.centre_in_world().cast<float>()), seed_(seed) {
     for (const CausticMaps& m : maps) {
         tracers_.emplace_back(scene, m.empty() ? nullptr : &m, paths, &translucent);
     }
 }
 
-void PixelSampler::add_samples(int x, int y, int target, int soft_target, int light_samples,
-                               PixelSums& sums) const {
-    // The camera rays of a pixel run side by side: what they meet is found together.
-    constexpr int kTogether = 16;
-    const int end = std::max(target, soft_target);
-    std::array<std::optional<CameraSample>, kTogether> samples;
-    std::array<Ray, kTogether> rays;
-    std::array<Hit, kTogether> hits;
-    while (sums.count < end) {
-        const int first = sums.count, count = std::min(kTogether, end - first);
-        for (int k = 0; k < count; ++k) {
-            const auto slot = static_cast<std::size_t>(k);
-            samples[slot] = camera_sample(camera_, seed_, x, y, first + k);
-            rays[slot] = {origin_, samples[slot]->direction, 0.0f, 1e30f, kAllParts};
-        }
-        const auto some = static_cast<std::size_t>(count);
-        scene_.closest(std::span<const Ray>(rays).first(some), std::span(hits).first(some));
-        for (std::size_t k = 0; k < some; ++k) {
-            const bool finds_soft = sums.soft_count < soft_target;
-            add_sample(x, y, *samples[k], {finds_soft, finds_soft ? 1 : light_samples, &hits[k]},
-                       sums);
-            ++sums.count;
-            sums.soft_count += finds_soft ? 1 : 0;
+void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>& soft_target,
+                               int light_samples, Image<PixelSums>& sums) const {
+    PathGroup group(tracers_, origin_, [&](int x, const PathTask& task, const PathPair& pair) {
+        add(pair, task.wish, sums(x, y));
+    });
+    for (int x = 0; x < sums.width(); ++x) {
+        const PixelSums& pixel = sums(x, y);
+        int soft_left = soft_target(x, y) - pixel.soft_count;
+        const int end = std::max(target(x, y), soft_target(x, y));
+        for (int k = pixel.count; k < end; ++k) {
+            // Neighbours begin with different passes: soft light is averaged over them.
+            const auto turn = static_cast<std::size_t>(k + x + 2 * y);
+            const bool finds_soft = soft_left-- > 0;
+            group.add(turn % tracers_.size(), x,
+                      {camera_sample(rays_, seed_, x, y, k),
+                       {finds_soft, finds_soft ? 1 : light_samples}});
         }
     }
+    group.finish();
 }
 
-void PixelSampler::add_sample(int x, int y, const CameraSample& sample, const PathWish& wish,
-                              PixelSums& sums) const {
-    const auto& [sampler, direction] = sample;
-    // Neighbours begin with different passes: soft light is averaged over them.
-    const auto turn = static_cast<std::size_t>(sums.count + x + 2 * y);
-    const PathTracer& tracer = tracers_[turn % tracers_.size()];
-    const PathPair pair = tracer.trace_both(origin_, direction, sampler, wish);
+void PixelSampler::add(const PathPair& pair, const PathWish& wish, PixelSums& sums) const {
     const PathResult &with = pair.with(), &without = pair.without();
     const bool is_covered = with.first_part >= 0 && scene_.is_virtual(with.first_part);
     const Rgb sharp = with.sharp();
@@ -132,7 +120,9 @@ void PixelSampler::add_sample(int x, int y, const CameraSample& sample, const Pa
         sums.block_square += sums.block * sums.block;
         sums.block = 0;
     }
+    ++sums.count;
     if (!wish.finds_soft) return;
+    ++sums.soft_count;
     const float soft_change = luminance(is_covered ? soft_with : Rgb(soft_with - soft_without));
     sums.soft_change += soft_change;
     sums.soft_change_square += soft_change * soft_change;

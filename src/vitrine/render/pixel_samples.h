@@ -50,18 +50,18 @@ class PixelSampler {
                  const TranslucentLight& translucent, const Camera& camera,
                  const PathOptions& paths, std::uint64_t seed);
 
-    /// Brings the pixel to `target` samples, and those with soft light to `soft_target`.
+    /// Brings the pixels of row `y` to `target` samples, and those with soft light to
+    /// `soft_target`.
     /// @param light_samples shadow rays per lamp of samples without soft light
-    void add_samples(int x, int y, int target, int soft_target, int light_samples,
-                     PixelSums& sums) const;
+    void add_samples(int y, const Image<int>& target, const Image<int>& soft_target,
+                     int light_samples, Image<PixelSums>& sums) const;
 
   private:
-    void add_sample(int x, int y, const CameraSample& sample, const PathWish& wish,
-                    PixelSums& sums) const;
+    void add(const PathPair& pair, const PathWish& wish, PixelSums& sums) const;
 
     const RenderScene& scene_;
     std::vector<PathTracer> tracers_;
-    const Camera& camera_;
+    CameraRays rays_;
     Vec3f origin_;
     std::uint64_t seed_;
 };

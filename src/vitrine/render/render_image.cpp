@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "render/path_group.h"
 #include "render/pixel_samples.h"
 #include "render/sample_plan.h"
 
@@ -78,15 +79,14 @@ struct PixelSum {
     }
 };
 
-/// Calls `body(x, y)` for every pixel, in bands with a progress report after each.
+/// Calls `body(y)` for every row, in bands with a progress report after each.
 template <typename Body>
-void for_each_pixel(const Camera& camera, const Progress& progress, const Body& body) {
+void for_each_row(const Camera& camera, const Progress& progress, const Body& body) {
     constexpr int kBand = 16;
     for (int band = 0; band < camera.height; band += kBand) {
         const int rows = std::min(kBand, camera.height - band);
-        parallel_for(static_cast<std::size_t>(rows), 1, [&](std::size_t row) {
-            for (int x = 0; x < camera.width; ++x) body(x, band + static_cast<int>(row));
-        });
+        parallel_for(static_cast<std::size_t>(rows), 1,
+                     [&](std::size_t row) { body(band + static_cast<int>(row)); });
         progress.update(static_cast<double>(band + rows) / camera.height, "render");
     }
 }
@@ -112,30 +112,46 @@ class ImageSampler {
     ImageSampler(const RenderScene& scene, const CausticMaps* caustics, const Camera& camera,
                  const TranslucentLight& translucent, const FinalOptions& options)
         : tracer_(scene, caustics, options.paths, &translucent),
-          camera_(camera),
+          rays_(camera),
           origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
 
-    /// Brings the pixel to `target` samples, and those with soft light to `soft_target` (negative:
-    /// all have it, as a part of the whole).
-    void add_samples(int x, int y, int target, int soft_target, PixelSum& sums) const {
-        for (; sums.count < target; ++sums.count) {
-            const auto [sampler, direction] = camera_sample(camera_, seed_, x, y, sums.count);
-            const PathWish wish{soft_target < 0 || sums.soft_count < soft_target, 1};
-            const PathResult path = tracer_.trace(origin_, direction, sampler, wish);
-            if (soft_target >= 0) {
-                sums.soft.add(path, wish.finds_soft);
-                sums.soft_count += wish.finds_soft ? 1 : 0;
+    /// Brings the pixels of a row to `target(x)` samples, and those with soft light to
+    /// `soft_target(x)` (negative: all have it, as a part of the whole).
+    template <typename Target, typename SoftTarget>
+    void add_samples(int y, const Target& target, const SoftTarget& soft_target,
+                     Image<PixelSum>& sums) const {
+        PathGroup group(std::span(&tracer_, 1), origin_,
+                        [&](int x, const PathTask& task, const PathPair& pair) {
+                            add(pair.with(), task.wish, soft_target(x) < 0, sums(x, y));
+                        });
+        for (int x = 0; x < sums.width(); ++x) {
+            const PixelSum& pixel = sums(x, y);
+            int soft_left = soft_target(x) - pixel.soft_count;
+            const int end = target(x);
+            for (int k = pixel.count; k < end; ++k) {
+                group.add(0, x,
+                          {camera_sample(rays_, seed_, x, y, k),
+                           {soft_target(x) < 0 || soft_left-- > 0, 1}});
             }
-            const Rgb value = soft_target < 0 ? path.total() : path.sharp();
-            sums.sum += value.cast<double>();
-            sums.square += static_cast<double>(luminance(value)) * luminance(value);
         }
+        group.finish();
     }
 
   private:
+    static void add(const PathResult& path, const PathWish& wish, bool is_whole, PixelSum& sums) {
+        if (!is_whole) {
+            sums.soft.add(path, wish.finds_soft);
+            sums.soft_count += wish.finds_soft ? 1 : 0;
+        }
+        const Rgb value = is_whole ? path.total() : path.sharp();
+        sums.sum += value.cast<double>();
+        sums.square += static_cast<double>(luminance(value)) * luminance(value);
+        ++sums.count;
+    }
+
     PathTracer tracer_;
-    const Camera& camera_;
+    CameraRays rays_;
     Vec3f origin_;
     std::uint64_t seed_;
 };
@@ -185,12 +201,15 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         }
         const ImageSampler sampler(scene, maps, camera, translucent, options);
         const auto run = [&](double from, double to) {
-            for_each_pixel(camera, progress.part(start + from * share, start + to * share),
-                           [&](int x, int y) {
-                               const int soft =
-                                   is_averaged ? soft_share(soft_per_pass * (pass + 1), x, y) : -1;
-                               sampler.add_samples(x, y, plan(x, y) * (pass + 1), soft, sums(x, y));
-                           });
+            for_each_row(
+                camera, progress.part(start + from * share, start + to * share), [&](int y) {
+                    sampler.add_samples(
+                        y, [&](int x) { return plan(x, y) * (pass + 1); },
+                        [&](int x) {
+                            return is_averaged ? soft_share(soft_per_pass * (pass + 1), x, y) : -1;
+                        },
+                        sums);
+                });
         };
         const bool is_planned = pass > 0 || options.samples || options.max_samples_per_pixel <= 0;
         run(0.15, is_planned ? 1.0 : 0.4);

@@ -36,10 +36,14 @@ class BodyGatherer {
             Rgbd with = Rgbd::Zero(), without = Rgbd::Zero();
             const std::uint32_t free =
                 (buried_with_[i] ? 0u : kVirtualParts) | (buried_without_[i] ? 0u : kRealParts);
+            std::vector<PathTask> tasks;
+            const std::uint64_t stream = stream_key(options_.seed, 0x7a15u, unsigned(part_), i);
             for (int s = 0; s < options_.paths_per_sample; ++s) {
-                const PathSampler sampler(stream_key(options_.seed, 0x7a15u, unsigned(part_), i),
-                                          static_cast<std::uint32_t>(s));
-                const PathPair pair = tracer.entering(point, eta_, sampler, free);
+                tasks.push_back({{PathSampler(stream, std::uint32_t(s)), Vec3f::Zero()}, {}});
+            }
+            std::vector<PathPair> pairs(tasks.size());
+            tracer.entering(point, eta_, tasks, free, pairs);
+            for (const PathPair& pair : pairs) {
                 with += pair.with().total().cast<double>();
                 without += pair.without().total().cast<double>();
                 if (needs_both_ && pair.is_touched()) touched[i] = 1;
