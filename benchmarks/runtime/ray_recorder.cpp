@@ -13,6 +13,9 @@ using Occluded = void (*)(RTCScene, RTCIntersectContext*, RTCRay*);
 const auto embree_intersect = reinterpret_cast<Intersect>(dlsym(RTLD_NEXT, "rtcIntersect1"));
 using Stream = void (*)(RTCScene, RTCIntersectContext*, RTCRayHit*, unsigned, std::size_t);
 const auto embree_stream = reinterpret_cast<Stream>(dlsym(RTLD_NEXT, "rtcIntersect1M"));
+using OccludedStream = void (*)(RTCScene, RTCIntersectContext*, RTCRay*, unsigned, std::size_t);
+const auto embree_occluded_stream =
+    reinterpret_cast<OccludedStream>(dlsym(RTLD_NEXT, "rtcOccluded1M"));
 const auto embree_occluded = reinterpret_cast<Occluded>(dlsym(RTLD_NEXT, "rtcOccluded1"));
 
 }  // namespace
@@ -43,12 +46,14 @@ void count(const RTCRayHit& hit, ReplaySums& sums) {
     sums.distance += hit.ray.tfar;
 }
 
+void count(const RTCRay& ray, ReplaySums& sums) { sums.hits += ray.tfar < 0 ? 1 : 0; }
+
 void send_one(const RecordedRay& recorded, ReplaySums& sums) {
     RTCIntersectContext context = recorded.context;
     if (recorded.is_occlusion) {
         RTCRay ray = recorded.ray;
         embree_occluded(recorded.scene, &context, &ray);
-        sums.hits += ray.tfar < 0 ? 1 : 0;
+        count(ray, sums);
         return;
     }
     RTCRayHit hit = start_of(recorded);
@@ -60,18 +65,27 @@ void send_one(const RecordedRay& recorded, ReplaySums& sums) {
 
 ReplaySums replay(const std::vector<RecordedRay>& rays) {
     ReplaySums sums;
-    std::vector<RTCRayHit> stream;
+    std::vector<RTCRayHit> hits;
+    std::vector<RTCRay> shadows;
     for (std::size_t i = 0; i < rays.size(); i += rays[i].stream) {
-        if (rays[i].stream == 1) {
-            send_one(rays[i], sums);
+        const RecordedRay& first = rays[i];
+        if (first.stream == 1) {
+            send_one(first, sums);
             continue;
         }
-        stream.resize(rays[i].stream);
-        for (std::size_t k = 0; k < stream.size(); ++k) stream[k] = start_of(rays[i + k]);
-        RTCIntersectContext context = rays[i].context;
-        embree_stream(rays[i].scene, &context, stream.data(), static_cast<unsigned>(stream.size()),
-                      sizeof(RTCRayHit));
-        for (const RTCRayHit& hit : stream) count(hit, sums);
+        RTCIntersectContext context = first.context;
+        if (first.is_occlusion) {
+            shadows.resize(first.stream);
+            for (std::size_t k = 0; k < shadows.size(); ++k) shadows[k] = rays[i + k].ray;
+            embree_occluded_stream(first.scene, &context, shadows.data(), first.stream,
+                                   sizeof(RTCRay));
+            for (const RTCRay& ray : shadows) count(ray, sums);
+            continue;
+        }
+        hits.resize(first.stream);
+        for (std::size_t k = 0; k < hits.size(); ++k) hits[k] = start_of(rays[i + k]);
+        embree_stream(first.scene, &context, hits.data(), first.stream, sizeof(RTCRayHit));
+        for (const RTCRayHit& hit : hits) count(hit, sums);
     }
     return sums;
 }
@@ -100,4 +114,12 @@ extern "C" void rtcIntersect1M(RTCScene scene, RTCIntersectContext* context, RTC
         vitrine::list.push_back({hits[i].ray, scene, *context, false, i == 0 ? count : 0});
     }
     vitrine::embree_stream(scene, context, hits, count, stride);
+}
+
+extern "C" void rtcOccluded1M(RTCScene scene, RTCIntersectContext* context, RTCRay* rays,
+                              unsigned count, std::size_t stride) {
+    for (unsigned i = 0; vitrine::is_recording && i < count; ++i) {
+        vitrine::list.push_back({rays[i], scene, *context, true, i == 0 ? count : 0});
+    }
+    vitrine::embree_occluded_stream(scene, context, rays, count, stride);
 }

@@ -1,6 +1,7 @@
 // benchmarks/runtime/ray_recorder.h: the rays that the renderer sends to Embree, as a list.
 //
-// Linking this file in puts its own `rtcIntersect1`, `rtcIntersect1M` and `rtcOccluded1` before
+// Linking this file in puts its own `rtcIntersect1`, `rtcIntersect1M`, `rtcOccluded1` and
+// `rtcOccluded1M` before
 // Embree's: each passes its call on, and keeps the rays while a recording is on. So the list holds
 // exactly what was asked, in its order, with its flags; nothing in the product knows of it. One
 // thread only.

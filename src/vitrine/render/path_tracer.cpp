@@ -66,6 +66,8 @@ void PathTracer::finish(Wave& wave) const {
     while (!wave.states.empty()) {
         wave.next.clear();
         const std::size_t count = wave.states.size();
+        for (const Hit& hit : wave.hits) scene_.prefetch_triangle(hit);
+        for (const Hit& hit : wave.hits) scene_.prefetch_vertices(hit);
         for (std::size_t i = 0; i < count; ++i) {
             State& state = wave.states[i];
             const Hit& hit = wave.hits[i];

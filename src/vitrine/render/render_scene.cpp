@@ -186,6 +186,18 @@ Rgb RenderScene::transmittance(const Media& media, float distance) const {
     return (-medium->sigma_a_per_m * distance).exp();
 }
 
+void RenderScene::prefetch_vertices(const Hit& hit) const {
+    if (!hit.is_hit()) return;
+    const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
+    const Triangle& t = mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+    for (int k = 0; k < 3; ++k) {
+        const auto v = static_cast<std::size_t>(t[k]);
+        __builtin_prefetch(&mesh.vertices[v]);
+        if (!mesh.normals.empty()) __builtin_prefetch(&mesh.normals[v]);
+        if (!mesh.colours.empty()) __builtin_prefetch(&mesh.colours[v]);
+    }
+}
+
 ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {
     const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
     ShadingPoint point;

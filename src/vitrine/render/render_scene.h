@@ -114,6 +114,14 @@ class RenderScene {
     /// exp(-sigma_a distance) of the medium a path is in.
     Rgb transmittance(const Media& media, float distance) const;
 
+    /// Asks memory for what `surface` and `bsdf` will read; the second needs what the first asks
+    /// for.
+    void prefetch_triangle(const Hit& hit) const {
+        if (!hit.is_hit()) return;
+        const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
+        __builtin_prefetch(&mesh.triangles[static_cast<std::size_t>(hit.triangle)]);
+    }
+    void prefetch_vertices(const Hit& hit) const;
     /// The surface that `hit` of a ray found.
     ShadingPoint surface(const Hit& hit, const Vec3f& ray_direction) const;
     /// Scattering of an opaque or mirror part at a point; dielectrics need the media and are not

@@ -182,30 +182,17 @@ bool Accel::is_occluded(const Ray& ray) const {
 void Accel::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const {
     occluded.assign(rays.size(), 0);
     if (!impl_) return;
-    constexpr std::size_t kPacket = 4;
-    for (std::size_t begin = 0; begin < rays.size(); begin += kPacket) {
-        const std::size_t count = std::min(kPacket, rays.size() - begin);
+    constexpr std::size_t kStream = 64;
+    std::array<RTCRay, kStream> stream;
+    for (std::size_t begin = 0; begin < rays.size(); begin += kStream) {
+        const std::size_t count = std::min(kStream, rays.size() - begin);
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
-        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-        alignas(16) int valid[kPacket] = {};
-        RTCRay4 packet = {};
+        for (std::size_t i = 0; i < count; ++i) stream[i] = to_embree(rays[begin + i]);
+        rtcOccluded1M(impl_->scene, &context, stream.data(), static_cast<unsigned>(count),
+                      sizeof(RTCRay));
         for (std::size_t i = 0; i < count; ++i) {
-            const Ray& ray = rays[begin + i];
-            valid[i] = -1;
-            packet.org_x[i] = ray.origin.x();
-            packet.org_y[i] = ray.origin.y();
-            packet.org_z[i] = ray.origin.z();
-            packet.dir_x[i] = ray.direction.x();
-            packet.dir_y[i] = ray.direction.y();
-            packet.dir_z[i] = ray.direction.z();
-            packet.tnear[i] = ray.min_distance;
-            packet.tfar[i] = ray.max_distance;
-            packet.mask[i] = ray.mask;
-        }
-        rtcOccluded4(valid, impl_->scene, &context, &packet);
-        for (std::size_t i = 0; i < count; ++i) {
-            occluded[begin + i] = packet.tfar[i] < 0.0f ? 1 : 0;
+            occluded[begin + i] = stream[i].tfar < 0.0f ? 1 : 0;
         }
     }
 }

@@ -48,7 +48,7 @@ class Accel {
     /// in half the time or less; those that do not cost as much as alone.
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
     bool is_occluded(const Ray& ray) const;
-    /// Answers `occluded[i]` for each ray; coherent groups are traced together.
+    /// Answers `occluded[i]` for each ray: in two thirds of the time or less, alike or not.
     void occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const;
 
     /// The point of any surface nearest to `point` within `max_distance`: `distance` is Euclidean,
