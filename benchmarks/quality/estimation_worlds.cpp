@@ -1,6 +1,7 @@
 // Errors of the estimators, and of the doubts they report, over many made worlds:
-//   vitrine_estimation_worlds [--seeds FIRST:LAST] [--results FILE.jsonl] [--only-metal]
-//                             [--joint separate|likelihoods|highlights] [--verbose]
+//   vitrine_estimation_worlds [--seeds FIRST:LAST] [--results FILE.jsonl]
+//                             [--only-metal | --only-glass] [--joint
+//                             separate|likelihoods|highlights] [--verbose]
 //   vitrine_estimation_worlds --report FILE.jsonl [FILE...] [--only odd|even]
 // Each world is one line of FILE; seeds already there are skipped, so a run can be stopped and
 // resumed, and several may run side by side on files of their own. Seeds with which constants of
@@ -13,6 +14,7 @@
 
 #include <cstdio>
 #include <ctime>
+#include <optional>
 #include <set>
 
 using namespace vitrine;
@@ -33,14 +35,15 @@ void print_cost_at_truth(const World& world, const SceneEstimate& estimate) {
                 estimate.light.error_refined, at_truth.error_refined);
 }
 
-void run_worlds(std::uint64_t first, std::uint64_t last, bool is_only_metal, bool is_verbose,
-                const EstimateOptions& estimation, const std::filesystem::path& file) {
+void run_worlds(std::uint64_t first, std::uint64_t last, std::optional<WorldObject> only_object,
+                bool is_verbose, const EstimateOptions& estimation,
+                const std::filesystem::path& file) {
     std::set<std::uint64_t> done;
     for (const WorldErrors& known : read_world_errors(file)) done.insert(known.seed);
     for (std::uint64_t seed = first; seed <= last; ++seed) {
         if (done.contains(seed)) continue;
         const WorldOptions options = series_world(seed);
-        if (is_only_metal && options.object != WorldObject::Metal) continue;
+        if (only_object && options.object != *only_object) continue;
         const double start = cpu_seconds();
         const World world = make_world(options);
         const double made = cpu_seconds();
@@ -62,7 +65,8 @@ int main(int argc, char** argv) {
     std::filesystem::path results = "estimation_worlds.jsonl";
     std::vector<std::filesystem::path> reports;
     std::string only;
-    bool is_only_metal = false, is_verbose = false;
+    std::optional<WorldObject> only_object;
+    bool is_verbose = false;
     EstimateOptions estimation;
     for (int i = 1; i < argc; ++i) {
         const std::string argument = argv[i];
@@ -76,7 +80,9 @@ int main(int argc, char** argv) {
         } else if (argument == "--only" && i + 1 < argc) {
             only = argv[++i];
         } else if (argument == "--only-metal") {
-            is_only_metal = true;
+            only_object = WorldObject::Metal;
+        } else if (argument == "--only-glass") {
+            only_object = WorldObject::Glass;
         } else if (argument == "--joint" && i + 1 < argc) {
             const std::string mode = argv[++i];
             estimation.joint.mode = mode == "likelihoods"  ? JointMode::Likelihoods
@@ -93,7 +99,7 @@ int main(int argc, char** argv) {
         }
     }
     if (reports.empty()) {
-        run_worlds(first, last, is_only_metal, is_verbose, estimation, results);
+        run_worlds(first, last, only_object, is_verbose, estimation, results);
         reports = {results};
     }
     std::vector<WorldErrors> all;

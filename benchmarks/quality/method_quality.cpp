@@ -183,10 +183,11 @@ void measure_joint(const Case& c, const SceneEstimate& ours, Table& table) {
         JointOptions options;
         options.mode = mode;
         JointReport report;
+        std::vector<ObjectEstimate> objects = ours.objects;
         const Clock clock;
         const LightEstimate moved =
             refine_light_jointly(c.scene, c.capture.frames, c.capture.saturation_level, ours.light,
-                                 ours.objects, light, {}, options, &report);
+                                 light, {}, options, objects, &report);
         const Error error = error_of(c, positions_of(moved));
         table.add(row, error, clock.cost());
         fmt::print(" {} {:.2f} deg (object cost {:.4f} to {:.4f})", row, error.direction_deg,

@@ -2,31 +2,13 @@
 // throws on the table. Internal to estimate/transparent and estimate/materials.
 #pragma once
 
+#include "estimate/caustic_places.h"
 #include "estimate/estimate.h"
-#include "estimate/observations.h"
-#include "scene/light.h"
 
 #include <span>
 #include <vector>
 
 namespace vitrine {
-
-struct CausticCueOptions {
-    int photon_count = 40'000;       ///< per index; quasi-random: 15 a pixel suffice
-    double gather_radius_m = 0.004;  ///< about two pixels seen from a metre
-    int pixel_step = 3;
-    std::size_t max_receivers = 6000;
-    double block_size_m = 0.02;  ///< patches of the table that the evidence is summed over
-};
-
-/// Lamps and what else lights the table, as found so far.
-struct CausticScene {
-    std::vector<DiscLight> lights;
-    Rgb ambient = Rgb::Zero();
-    Rgb sigma_a_per_m = Rgb::Zero();
-    std::uint32_t opaque_mask = kScanMask;  ///< parts that block, the object itself left out
-    SupportPlane plane;
-};
 
 /// Robust cost of every trial index over the object's shadow and caustic on the support plane: mean
 /// Geman and McClure loss of log(seen) - log(predicted), one free albedo; clipped pixels are

@@ -1,5 +1,6 @@
 #include "estimate/joint_light.h"
 
+#include "estimate/glass_cue.h"
 #include "estimate/light_combinations.h"
 #include "estimate/light_data.h"
 #include "estimate/light_search.h"
@@ -89,8 +90,15 @@ DiscLight turned(const DiscLight& lamp, const Vec3& reference, double x, double 
 class JointObjective {
   public:
     JointObjective(const LightData& data, const LightFit& fit, const ObjectContext& context,
-                   std::vector<std::unique_ptr<const Metal>> metals, const JointOptions& options)
-        : data_(data), fit_(fit), context_(context), metals_(std::move(metals)), options_(options) {
+                   std::vector<std::unique_ptr<const Metal>> metals,
+                   std::vector<std::unique_ptr<const GlassCue>> glasses,
+                   const JointOptions& options)
+        : data_(data),
+          fit_(fit),
+          context_(context),
+          metals_(std::move(metals)),
+          glasses_(std::move(glasses)),
+          options_(options) {
         std::set<int> blocks(data.samples.block.begin(), data.samples.block.end());
         blocks_ = static_cast<double>(blocks.size());
     }
@@ -106,10 +114,17 @@ class JointObjective {
     double object_cost(const std::vector<DiscLight>& lamps) const {
         double sum = 0.0;
         for (const auto& metal : metals_) sum += metal_cost(*metal, lamps, context_.bright);
-        return sum / static_cast<double>(metals_.size());
+        return metals_.empty() ? 0.0 : sum / static_cast<double>(metals_.size());
     }
-    double operator()(const std::vector<DiscLight>& lamps) const {
+    /// Of glass `g` itself.
+    double ior(std::size_t g, double caustic_ior) const { return glasses_[g]->ior(caustic_ior); }
+    /// @param iors that the caustic of each glass asks for
+    double operator()(const std::vector<DiscLight>& lamps, std::span<const double> iors) const {
         double nll = 0.0;
+        for (std::size_t g = 0; g < glasses_.size(); ++g) {
+            if (iors[g] < glasses_[g]->ior_min() || iors[g] > glasses_[g]->ior_max()) return 1e9;
+            nll += (*glasses_[g])(lamps, iors[g]);
+        }
         for (const auto& metal : metals_)
             nll += 0.5 * metal->patches *
                    std::log(std::max(metal_cost(*metal, lamps, context_.bright), 1e-6));
@@ -120,6 +135,7 @@ class JointObjective {
 
     /// The best of all combinations of places, rho and sigma of each metal exact for each.
     std::vector<DiscLight> best_combination(const std::vector<DiscLight>& lamps) const {
+        if (metals_.empty()) return lamps;
         const std::vector<std::vector<DiscLight>> places = places_of(lamps);
         std::vector<double> total;
         std::vector<std::vector<int>> choice;
@@ -204,18 +220,48 @@ class JointObjective {
     const LightFit& fit_;
     const ObjectContext& context_;
     std::vector<std::unique_ptr<const Metal>> metals_;
+    std::vector<std::unique_ptr<const GlassCue>> glasses_;
     JointOptions options_;
     double blocks_ = 1.0;
 };
+
+/// The solid clear objects whose index is free or known, with the objects they are.
+struct Glasses {
+    std::vector<std::unique_ptr<const GlassCue>> cues;
+    std::vector<std::size_t> object;
+};
+
+Glasses glasses_of(const ObjectContext& context, const LightEstimate& light,
+                   const std::vector<ObjectEstimate>& objects, const TransparentOptions& options) {
+    Glasses glasses;
+    for (std::size_t k = 0; k < objects.size(); ++k) {
+        const ObjectEstimate& object = objects[k];
+        if (object.object_class != ObjectClass::Transparent || object.is_hollow) continue;
+        const CausticScene scene = {context.light.lights, context.light.ambient,
+                                    object.sigma_a_per_m.value, kScanMask, light.plane};
+        Estimate<double> through = object.ior_through;
+        if (options.ior_step > 0.0 || !options.ior_grid.empty()) through.stddev = 0.0;  // stays
+        auto cue =
+            std::make_unique<const GlassCue>(context.world, context.lookup, static_cast<int>(k),
+                                             scene, through, options.ior_min, options.ior_max);
+        if (!cue->is_usable()) continue;
+        glasses.cues.push_back(std::move(cue));
+        glasses.object.push_back(k);
+    }
+    return glasses;
+}
 
 }  // namespace
 
 LightEstimate refine_light_jointly(const Scene& scene, std::span<const RgbdFrame> frames,
                                    double saturation_level, const LightEstimate& light,
-                                   const std::vector<ObjectEstimate>& objects,
                                    const LightOptions& light_options,
                                    const MaterialOptions& material_options,
-                                   const JointOptions& options, JointReport* report) {
+                                   const JointOptions& options,
+                                   std::vector<ObjectEstimate>& objects, JointReport* report) {
+    if (options.mode == JointMode::Separate || light.lights.empty() ||
+        !light_options.known_lights.empty())
+        return light;
     const ObjectContext context(scene, frames, saturation_level, light);
     std::vector<std::unique_ptr<const Metal>> metals;
     for (int k = 0; k < context.world.object_count(); ++k) {
@@ -224,14 +270,17 @@ LightEstimate refine_light_jointly(const Scene& scene, std::span<const RgbdFrame
         metals.push_back(make_metal(context, k, object.clusters.front().fit, material_options));
         if (metals.back()->pixels.empty()) metals.pop_back();
     }
-    if (options.mode == JointMode::Separate || metals.empty() || light.lights.empty() ||
-        !light_options.known_lights.empty())
-        return light;
+    Glasses glasses;
+    if (options.mode == JointMode::Likelihoods)
+        glasses = glasses_of(context, light, objects, material_options.transparent);
+    if (metals.empty() && glasses.cues.empty()) return light;
     const LightData data(scene, frames, saturation_level, light_options);
     if (!data.problem.empty()) return light;
     const LightFit fit(data.world, data.samples, data.reference, data.opaque_mask,
                        data.see_through_mask, light_options.seed);
-    const JointObjective objective(data, fit, context, std::move(metals), options);
+    const std::vector<std::size_t> glass_object = glasses.object;
+    const JointObjective objective(data, fit, context, std::move(metals), std::move(glasses.cues),
+                                   options);
 
     const std::vector<DiscLight>& start = context.light.lights;
     const std::vector<DiscLight> nearest = objective.best_combination(start);
@@ -243,20 +292,27 @@ LightEstimate refine_light_jointly(const Scene& scene, std::span<const RgbdFrame
             lamps.push_back(turned(nearest[l], reference, x[3 * l], x[3 * l + 1], x[3 * l + 2]));
         return lamps;
     };
+    const std::size_t first_ior = 3 * nearest.size();
     const auto cost = [&](const std::vector<double>& x) {
         const std::vector<DiscLight> lamps = lamps_at(x);
         for (std::size_t l = 0; l < lamps.size(); ++l)
             if (angle_between(lamps[l].position_m - reference, start[l].position_m - reference) >
                 max_move)
                 return 1e9;
-        return objective(lamps);
+        return objective(lamps, std::span(x).subspan(first_ior));
     };
-    std::vector<double> steps;
+    std::vector<double> steps, at;
     for (std::size_t l = 0; l < nearest.size(); ++l) steps.insert(steps.end(), {0.02, 0.02, 0.05});
-    const MinimumNd best =
-        minimise_nelder_mead(cost, std::vector<double>(steps.size(), 0.0), steps,
-                             {.max_evaluations = options.max_evaluations, .min_size = 0.02});
+    at.assign(steps.size(), 0.0);
+    for (const std::size_t k : glass_object) {
+        at.push_back(objects[k].ior.value);
+        steps.push_back(0.02);
+    }
+    const MinimumNd best = minimise_nelder_mead(
+        cost, at, steps, {.max_evaluations = options.max_evaluations, .min_size = 0.02});
     const std::vector<DiscLight> found = lamps_at(best.x);
+    for (std::size_t g = 0; g < glass_object.size(); ++g)
+        objects[glass_object[g]].ior.value = objective.ior(g, best.x[first_ior + g]);
     if (report) {
         report->moved_deg = degrees(
             angle_between(found[0].position_m - reference, start[0].position_m - reference));

@@ -39,9 +39,10 @@ struct JointReport {
 /// Returns `light` unchanged when no candidate is specular. Costs about 4 s on two cores.
 LightEstimate refine_light_jointly(const Scene& scene, std::span<const RgbdFrame> frames,
                                    double saturation_level, const LightEstimate& light,
-                                   const std::vector<ObjectEstimate>& objects,
                                    const LightOptions& light_options,
                                    const MaterialOptions& material_options,
-                                   const JointOptions& options, JointReport* report = nullptr);
+                                   const JointOptions& options,
+                                   std::vector<ObjectEstimate>& objects,
+                                   JointReport* report = nullptr);
 
 }  // namespace vitrine

@@ -76,8 +76,7 @@ class MovedLights {
     /// Irradiance, not intensity, stays while the distance changes.
     double weight(int k, int a, int b, int sign) const {
         return set_.lights[static_cast<std::size_t>(k)].weight *
-               std::exp(2.0 * moved(k, kLogDistance, a, b, sign) +
-                        moved(k, kLogShare, a, b, sign));
+               std::exp(2.0 * moved(k, kLogDistance, a, b, sign) + moved(k, kLogShare, a, b, sign));
     }
     const DirectColumn& column(int k, int a, int b, int sign) {
         const auto own = [&](int i) {
@@ -179,9 +178,9 @@ std::vector<LightDeviation> light_deviations(const LightFit& fit, const LightSet
             entry->second[a] += (plus.weighted[i] - minus.weighted[i]) / (2.0 * step);
         }
         for (int k = 0; k < light_count; ++k)
-            intensity_slope(a, k) = (moved.log_intensity(k, plus, a, 1) -
-                                     moved.log_intensity(k, minus, a, -1)) /
-                                    (2.0 * step);
+            intensity_slope(a, k) =
+                (moved.log_intensity(k, plus, a, 1) - moved.log_intensity(k, minus, a, -1)) /
+                (2.0 * step);
     }
     for (int a = 0; a < n; ++a) {
         for (int b = a + 1; b < n; ++b) {
@@ -192,8 +191,8 @@ std::vector<LightDeviation> light_deviations(const LightFit& fit, const LightSet
                 (2.0 * moved.step(a) * moved.step(b));
         }
     }
-    Eigen::MatrixXd meat = scatter_of(fit.samples(), block_sum) /
-                           (centre.total_weight * centre.total_weight);
+    Eigen::MatrixXd meat =
+        scatter_of(fit.samples(), block_sum) / (centre.total_weight * centre.total_weight);
     std::vector<LightDeviation> deviations(set.lights.size());
     for (int k = 0; k < light_count; ++k) {
         LightDeviation& deviation = deviations[static_cast<std::size_t>(k)];
@@ -204,7 +203,8 @@ std::vector<LightDeviation> light_deviations(const LightFit& fit, const LightSet
         // penumbra that says nothing of the radius from making the direction vague as well. The
         // loss becomes a likelihood by the scale at which curvature and scatter of the angles
         // agree.
-        const double scale = (hessian(x, x) + hessian(y, y)) / std::max(meat(x, x) + meat(y, y), 1e-30);
+        const double scale =
+            (hessian(x, x) + hessian(y, y)) / std::max(meat(x, x) + meat(y, y), 1e-30);
         for (const int a : {kPerLight * k + kLogDistance, kPerLight * k + kLogRadius}) {
             const double prior = 1.0 / (scale * kUnknownLog * kUnknownLog);
             hessian(a, a) = std::max(hessian(a, a), 0.0) + prior;
@@ -224,8 +224,7 @@ std::vector<LightDeviation> light_deviations(const LightFit& fit, const LightSet
             deviation.log_intensity = deviation.log_irradiance = kUnknownLog;
             continue;
         }
-        deviation.log_distance =
-            root(covariance(first + kLogDistance, first + kLogDistance));
+        deviation.log_distance = root(covariance(first + kLogDistance, first + kLogDistance));
         deviation.log_radius = root(covariance(first + kLogRadius, first + kLogRadius));
         Eigen::VectorXd slope = intensity_slope.col(k);
         deviation.log_intensity = root(slope.dot(covariance * slope));

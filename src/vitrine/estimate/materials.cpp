@@ -27,7 +27,7 @@ double strongest_lobe(const std::vector<WardCluster>& clusters) {
 }
 
 /// Class by cost; fills margin and reason.
-ObjectClass classify(ObjectEstimate& object, double unsure_margin) {
+ObjectClass classify(ObjectEstimate& object, double lobe_gain, double unsure_margin) {
     const double clear = std::min(object.cost_solid, object.cost_shell);
     object.class_margin = log_ratio(object.cost_ward, clear);
     if (std::abs(object.class_margin) < unsure_margin) {
@@ -35,7 +35,7 @@ ObjectClass classify(ObjectEstimate& object, double unsure_margin) {
         return ObjectClass::Unsure;
     }
     if (object.class_margin > 0.0) return ObjectClass::Transparent;
-    if (log_ratio(object.cost_diffuse, object.cost_ward) < kLobeGain) return ObjectClass::Diffuse;
+    if (lobe_gain < kLobeGain) return ObjectClass::Diffuse;
     if (strongest_lobe(object.clusters) < kCoatReflectance) {
         object.reason = "its gloss is as faint as that of plastic or paint";
         return ObjectClass::Diffuse;
@@ -132,12 +132,13 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         object.cost_diffuse = metal.cost_diffuse;
         object.clusters = metal.clusters;
         object.class_margin = 0.0;
-        object.object_class = classify(object, options.unsure_margin);
+        object.object_class = classify(object, metal.lobe_gain, options.unsure_margin);
         log_debug(
             "{}: {} pixels, costs solid {:.4f} (n {:.3f}, seen {:.2f}) shell {:.4f} (seen {:.2f}) "
-            "ward {:.4f} (sigma {:.3f}, lobe {:.2f}) diffuse {:.4f}",
+            "ward {:.4f} (sigma {:.3f}, lobe {:.2f}) diffuse {:.4f}, gain of the lobe {:.3f}",
             object.id, pixels.size(), solid.cost, solid.ior.value, solid.explained, shell.cost,
-            shell.explained, ward.cost, ward.sigma.value, ward.lobe_share, ward.cost_diffuse);
+            shell.explained, ward.cost, ward.sigma.value, ward.lobe_share, ward.cost_diffuse,
+            metal.lobe_gain);
         if (override && override->ignore) {
             object.object_class = ObjectClass::Diffuse;
             object.reason = "given: not an object";
@@ -148,7 +149,7 @@ std::vector<ObjectEstimate> estimate_materials(const Scene& scene,
         }
 
         const TransparentFit& clear = shell.cost < solid.cost ? shell : solid;
-        object.ior = clear.ior;
+        object.ior = object.ior_through = clear.ior;
         const bool is_free =
             !transparent.known_ior && transparent.ior_step == 0.0 && transparent.ior_grid.empty();
         if (object.object_class == ObjectClass::Transparent && !clear.is_shell && is_free)

@@ -40,7 +40,8 @@ struct ObjectEstimate {
     bool is_hollow = false;
     Estimate<double> wall_m;  ///< of a hollow one
     std::string mesh_file;
-    Estimate<double> ior;  ///< transparent only
+    Estimate<double> ior;          ///< transparent only
+    Estimate<double> ior_through;  ///< of the view through it alone; not in estimate.json
     /// Transparent only.
     Estimate<Rgb> sigma_a_per_m{Rgb::Zero(), Rgb::Zero(), 0.0, Outcome::NotIdentifiable, {}};
     std::vector<WardCluster> clusters;  ///< specular only

@@ -73,7 +73,7 @@ TEST(PublishedMethods, PaperFitsMetal) {
 TEST(PublishedMethods, BaselinesKnowOnlyDiffuseSurfaces) {
     const World world = make_world(small(3, WorldObject::Glass));
     for (const EstimateMethod method : {EstimateMethod::Local, EstimateMethod::InversePhoton}) {
-        const SceneEstimate e = estimate_scene(world.labelled, world.capture, options_of(method));
+        SceneEstimate e = estimate_scene(world.labelled, world.capture, options_of(method));
         ASSERT_FALSE(e.light.lights.empty());
         EXPECT_LT(light_error_deg(e.light, world), 60.0) << method_name(method);
         EXPECT_EQ(e.objects.at(0).object_class, ObjectClass::Diffuse);
@@ -99,8 +99,8 @@ TEST(JointLight, HighlightsBringAWrongLightBack) {
         joint.mode = mode;
         JointReport report;
         const LightEstimate back = refine_light_jointly(
-            world.labelled, world.capture.frames, world.capture.saturation_level, wrong, e.objects,
-            light_options, {}, joint, &report);
+            world.labelled, world.capture.frames, world.capture.saturation_level, wrong,
+            light_options, {}, joint, e.objects, &report);
         EXPECT_LT(light_error_deg(back, world), 1.5);
         EXPECT_GT(report.moved_deg, 1.0);
         EXPECT_LT(report.object_cost_after, report.object_cost_before);

@@ -89,9 +89,9 @@ SceneEstimate estimate_scene(const Scene& scene, const Capture& capture,
                                                 again, progress.part(0.7, 0.85));
         refined.error_initial = result.light.error_initial;
         refined.grid_direction = result.light.grid_direction;
-        result.light = refine_light_jointly(scene, capture.frames, capture.saturation_level,
-                                            refined, result.objects, again, options.materials,
-                                            options.joint, &result.joint);
+        result.light =
+            refine_light_jointly(scene, capture.frames, capture.saturation_level, refined, again,
+                                 options.materials, options.joint, result.objects, &result.joint);
         doubt_by_rival(result.light, rival);
         refit_specular(scene, capture.frames, capture.saturation_level, result.light,
                        options.materials, result.objects, progress.part(0.85, 1.0));

@@ -107,5 +107,42 @@ TEST(EstimateScene, TheUserKnowsBetter) {
     EXPECT_EQ(flat.objects[0].object_class, ObjectClass::Diffuse);
 }
 
+TEST(JointLight, ACausticMovesTheLightBackAndTheIndexWithIt) {
+    WorldOptions options;
+    options.seed = 3;
+    options.samples_per_pixel = 12;
+    const World world = make_world(options);
+    const auto& truth = std::get<Dielectric>(world.truth.parts[1].material);
+    LightOptions light_options = first_light_options(world.capture, {});
+    light_options.object_classes = {ObjectClass::Transparent};
+    light_options.start = world.lights;
+    const double clip = world.capture.saturation_level;
+    SceneEstimate e;
+    e.light = estimate_lights(world.labelled, world.capture.frames, clip, light_options);
+    e.objects = estimate_materials(world.labelled, world.capture.frames, clip, e.light);
+    ASSERT_EQ(e.objects.at(0).object_class, ObjectClass::Transparent);
+
+    DiscLight& lamp = e.light.lights[0].light;
+    const Frame frame(lamp.position_m.normalized().cast<float>());
+    lamp.position_m += 0.07 * lamp.position_m.norm() * frame.tangent.cast<double>();
+    lamp.normal = -lamp.position_m.normalized();
+    ASSERT_GT(light_error_deg(e, world), 2.5);
+    e.objects[0].ior.value = truth.ior + 0.04;
+    std::vector<ObjectEstimate> known = e.objects;
+    known[0].ior = known[0].ior_through = {1.4, 0.0, 0.0, Outcome::Converged, {}};
+    JointOptions joint;
+    joint.mode = JointMode::Likelihoods;
+    JointReport report;
+    e.light = refine_light_jointly(world.labelled, world.capture.frames, clip, e.light,
+                                   light_options, {}, joint, e.objects, &report);
+    EXPECT_GT(report.moved_deg, 1.0);
+    EXPECT_LT(light_error_deg(e, world), 1.5);
+    EXPECT_NEAR(e.objects[0].ior.value, truth.ior, 0.03);
+
+    refine_light_jointly(world.labelled, world.capture.frames, clip, e.light, light_options, {},
+                         joint, known);
+    EXPECT_EQ(known[0].ior.value, 1.4);  // what the user knows stays
+}
+
 }  // namespace
 }  // namespace vitrine

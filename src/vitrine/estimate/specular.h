@@ -47,8 +47,10 @@ struct WardFit {
     Ward ward;
     Estimate<double> sigma;  ///< geometric mean of both when they differ
     Rgb stddev_rho_d = Rgb::Zero(), stddev_rho_s = Rgb::Zero();
-    double cost = 1.0;                 ///< mean of min(|residual| / bright level, 0.25)
-    double cost_diffuse = 1.0;         ///< of the best fit without a lobe
+    double cost = 1.0;          ///< mean of min(|residual| / bright level, 0.25)
+    double cost_diffuse = 1.0;  ///< of the best fit without a lobe
+    /// The same two with clipped pixels, which the other models leave out: in both "at least".
+    double cost_with_clipped = 1.0, cost_diffuse_with_clipped = 1.0;
     Rgb albedo = Rgb::Constant(0.5f);  ///< of that fit
     double lobe_share = 0.0;           ///< share of the light explained by the lobe
     int pixel_count = 0;

@@ -127,6 +127,30 @@ TEST_F(SpecularTest, ClippedHighlightsSayAtLeast) {
     EXPECT_EQ(fit().censored_count, 0);
 }
 
+TEST_F(SpecularTest, AHighlightThatClipsEntirelySpeaksForTheLobe) {
+    shade(bronze(0.05, 0.05), 0.05f);
+    clip(0.25f);
+    const WardFit fitted = fit();
+    ASSERT_GT(fitted.censored_count, 5);
+    const double unclipped = std::log(fitted.cost_diffuse / fitted.cost);
+    const double all = std::log(fitted.cost_diffuse_with_clipped / fitted.cost_with_clipped);
+    EXPECT_GT(all, 0.15);
+    EXPECT_GT(all, unclipped);
+    // A diffuse surface that the lamp overexposes is no metal.
+    Ward paint;
+    paint.rho_d = Rgb(0.8f, 0.7f, 0.6f);
+    paint.rho_s = Rgb::Zero();
+    for (ObjectPixel& pixel : pixels_) {
+        pixel.is_clipped = false;
+        pixel.is_at_least = {};
+    }
+    shade(paint, 0.05f);
+    clip(0.6f);
+    const WardFit bright = fit();
+    ASSERT_GT(bright.censored_count, 5);
+    EXPECT_LT(std::log(bright.cost_diffuse_with_clipped / bright.cost_with_clipped), 0.15);
+}
+
 TEST_F(SpecularTest, NormalNoiseIsTakenOutOrSaysNo) {
     shade(bronze(0.12, 0.12), 0.0f);
     options_.normal_noise_rad = 0.04;

@@ -19,10 +19,6 @@ namespace {
 constexpr double kCap = 0.25;  // of the bright level: beyond, a pixel is simply wrong
 constexpr int kIorGrid = 21;   // step 0.04: no basin of the objective is narrower
 constexpr int kBootstrapRounds = 40;
-// Over an even background every index predicts about the same picture: the worst one must be worse
-// by this factor, and by more than gain errors of the pictures (of the bright level).
-constexpr double kMinCostContrast = 1.15;
-constexpr double kMinCostSpread = 0.02;
 constexpr double kMinExplained = 0.15;
 constexpr int kRays = 2;  // side of the square of rays in a pixel
 
@@ -164,6 +160,12 @@ double share_explained(const std::vector<ThroughPixel>& through) {
     return through.empty() ? 0.0 : static_cast<double>(valid) / static_cast<double>(through.size());
 }
 
+bool is_indifferent(double least, double greatest) {
+    constexpr double kMinCostContrast = 1.15;
+    constexpr double kMinCostSpread = 0.02;  // of the bright level: gain errors of the pictures
+    return greatest < std::max(kMinCostContrast * least, least + kMinCostSpread);
+}
+
 std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view_count,
                                 std::uint64_t round) {
     Rng rng(stream_key(0xb007u, round));
@@ -287,8 +289,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         fit.ior.outcome = fit.sigma_a_per_m.outcome = Outcome::NotIdentifiable;
         fit.ior.reason = fit.sigma_a_per_m.reason =
             "too little of what is seen through the object is seen past it in another view";
-    } else if (!options.known_ior &&
-               greatest < std::max(kMinCostContrast * fit.cost, fit.cost + kMinCostSpread)) {
+    } else if (!options.known_ior && is_indifferent(fit.cost, greatest)) {
         fit.ior.outcome = Outcome::NotIdentifiable;
         fit.ior.reason = "the background is too even: it looks the same through any index";
     } else if (!options.known_ior && fit.ior.stddev > 0.1) {

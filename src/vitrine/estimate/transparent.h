@@ -71,6 +71,9 @@ Rgb fit_absorption(const std::vector<ThroughPixel>& through, const std::vector<O
 double through_cost(const std::vector<ThroughPixel>& through,
                     const std::vector<ObjectPixel>& pixels, const Rgb& sigma_a, double bright,
                     const std::vector<int>& count = {});
+/// Over an even background every trial predicts about the same picture: whether the worst one is
+/// not worse than the best by a clear factor and by more than pictures' gains err.
+bool is_indifferent(double least_cost, double greatest_cost);
 /// How often each pixel is drawn when whole views are drawn with replacement.
 std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view_count,
                                 std::uint64_t round);

@@ -11,13 +11,14 @@
 namespace vitrine {
 namespace {
 
-/// A glass ball on a table, as `look_through` itself predicts it: recovery must be nearly exact.
+/// A glass ball on a table, as `look_through` or, with a wall, `look_through_vessel` itself
+/// predicts it: recovery must be nearly exact.
 struct Ball {
     Scene scene;
     std::vector<RgbdFrame> frames;
 
     /// @param pattern 0: table and surroundings of one even radiance
-    Ball(double ior, const Rgb& sigma_a, float pattern) {
+    Ball(double ior, const Rgb& sigma_a, float pattern, double wall_m = 0.0) {
         Mesh table = make_plane(1.6, 0.0, 240);
         table.colours.clear();
         for (const Vec3f& v : table.vertices) {
@@ -63,7 +64,8 @@ struct Ball {
         const std::vector<ObjectPixel> all =
             object_pixels(world, lookup, 0, {.pixels_per_view = 100'000, .border_px = 0});
         const std::vector<ThroughPixel> through =
-            look_through(world, lookup, 0, all, ior, kAmbient);
+            wall_m > 0.0 ? look_through_vessel(world, lookup, 0, all, ior, wall_m, kAmbient)
+                         : look_through(world, lookup, 0, all, ior, kAmbient);
         for (std::size_t i = 0; i < all.size(); ++i) {
             if (!through[i].is_valid) continue;
             frames[static_cast<std::size_t>(all[i].frame)].colour(all[i].u, all[i].v) =
@@ -72,13 +74,18 @@ struct Ball {
         }
     }
 
-    TransparentFit fit(const TransparentOptions& extra = {}) const {
+    TransparentFit fit(const TransparentOptions& options = {}) const {
+        return fit_with(fit_solid, options);
+    }
+    TransparentFit fit_as_vessel() const { return fit_with(fit_shell, {}); }
+
+    template <typename Fit>
+    TransparentFit fit_with(const Fit& fit, TransparentOptions options) const {
         const EstimationScene world(scene);
         const FrameLookup lookup(world, scene.cameras, frames, 1e9);
-        TransparentOptions options = extra;
         options.ambient = kAmbient;
-        return fit_solid(world, lookup, 0, object_pixels(world, lookup, 0), bright_level(lookup),
-                         options);
+        return fit(world, lookup, 0, object_pixels(world, lookup, 0), bright_level(lookup),
+                   options);
     }
 
     inline static const Rgb kAmbient = Rgb::Constant(0.5f);
@@ -112,6 +119,27 @@ TEST(FitSolid, AnswersOnTheGridAskedFor) {
     options.ior_step = 0.02;
     const TransparentFit fit = Ball(1.463, Rgb::Zero(), 1.0f).fit(options);
     EXPECT_NEAR(fit.ior.value, 1.46, 1e-9);
+}
+
+TEST(FitShell, RecoversItsOwnWall) {
+    const TransparentFit fit = Ball(1.5, Rgb(4, 1, 8), 1.0f, 0.0023).fit_as_vessel();
+    EXPECT_EQ(fit.wall_m.outcome, Outcome::Converged);
+    EXPECT_NEAR(std::log2(fit.wall_m.value / 0.0023), 0.0, 0.25);
+    EXPECT_EQ(fit.ior.outcome, Outcome::NotIdentifiable);
+    EXPECT_FALSE(fit.ior.reason.empty());
+}
+
+TEST(FitShell, SaysThatTheThinnestWallsTellNoThickness) {
+    const TransparentFit fit = Ball(1.5, Rgb::Zero(), 1.0f, 0.0004).fit_as_vessel();
+    EXPECT_EQ(fit.wall_m.outcome, Outcome::NotIdentifiable);
+    EXPECT_NE(fit.wall_m.reason.find("thinnest"), std::string::npos);
+}
+
+TEST(FitShell, SaysThatAnEvenBackgroundShowsNoWall) {
+    const TransparentFit fit = Ball(1.5, Rgb::Zero(), 0.0f, 0.0023).fit_as_vessel();
+    EXPECT_EQ(fit.wall_m.outcome, Outcome::NotIdentifiable);
+    EXPECT_NE(fit.wall_m.reason.find("even"), std::string::npos);
+    EXPECT_TRUE(std::isfinite(fit.wall_m.value) && std::isfinite(fit.wall_m.stddev));
 }
 
 TEST(RefractThrough, PassesABodyThatIsMetAgain) {

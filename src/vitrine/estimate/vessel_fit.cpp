@@ -90,7 +90,10 @@ TransparentFit fit_shell(const EstimationScene& scene, const FrameLookup& lookup
         return square > 0.0 ? sum / std::sqrt(square) : 0.0;
     };
     fit.wall_m.outcome = Outcome::Converged;
-    if (best < kFactorTwo) {
+    if (is_indifferent(cost[best], *std::max_element(cost.begin(), cost.end()))) {
+        fit.wall_m.outcome = Outcome::NotIdentifiable;
+        fit.wall_m.reason = "the background is too even: it looks the same through any wall";
+    } else if (best < kFactorTwo) {
         // The hull of an open vessel has a lid and a base as thin as its walls: the thinner all of
         // them, the less is wrong with it, whatever the wall.
         fit.wall_m.outcome = Outcome::NotIdentifiable;

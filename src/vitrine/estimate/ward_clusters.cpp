@@ -42,13 +42,25 @@ WardFit with_shared_lobe(const EstimationScene& scene, std::vector<ObjectPixel> 
     const WardLobe lobe{lead.ward.sigma_x, lead.ward.sigma_y, lead.ward.form};
     const SpecularModel model(scene, pixels, light, options);
     const SpecularColumns columns = model.columns(lobe);
-    fit.cost_diffuse = fit_lobe(model, columns, bright, false).cost;
+    const LobeFit diffuse = fit_lobe(model, columns, bright, false);
+    fit.cost_diffuse = diffuse.cost;
+    fit.cost_diffuse_with_clipped = diffuse.objective;
     for (std::size_t i = 0; i < pixels.size(); ++i)
         pixels[i].radiance -= lead.ward.rho_s * columns.lobe[i];
     const LobeFit rest = fit_lobe(model, columns, bright, false);
     fit.ward.rho_d = rest.rho_d;
     fit.cost = rest.cost;
+    fit.cost_with_clipped = rest.objective;
     return fit;
+}
+
+double lobe_gain(const std::vector<WardCluster>& clusters) {
+    double with = 1e-6, without = 1e-6;
+    for (const WardCluster& cluster : clusters) {
+        with += cluster.area_fraction * cluster.fit.cost_with_clipped;
+        without += cluster.area_fraction * cluster.fit.cost_diffuse_with_clipped;
+    }
+    return std::log(without / with);
 }
 
 }  // namespace
@@ -62,6 +74,7 @@ ClusteredWard fit_ward_clusters(const EstimationScene& scene,
     result.clusters = {{1.0, result.whole}};
     result.cost = result.whole.cost;
     result.cost_diffuse = result.whole.cost_diffuse;
+    result.lobe_gain = lobe_gain(result.clusters);
     AlbedoClusters paints = find_albedo_clusters(pixels, model.irradiance());
     if (paints.count == 1) return result;
 
@@ -99,6 +112,7 @@ ClusteredWard fit_ward_clusters(const EstimationScene& scene,
     result.clusters = std::move(clusters);
     result.cost = cost;
     result.cost_diffuse = cost_diffuse;
+    result.lobe_gain = lobe_gain(result.clusters);
     result.paints = std::move(paints);
     return result;
 }

@@ -17,6 +17,8 @@ struct ClusteredWard {
     WardFit whole;  ///< one lobe for everything
     std::vector<WardCluster> clusters;
     double cost = 1.0, cost_diffuse = 1.0;  ///< of all clusters, weighted with their area
+    /// Logarithm of the cost without lobes over that with them, clipped highlights included.
+    double lobe_gain = 0.0;
     AlbedoClusters paints;  ///< which cluster lies where; one paint when more do not pay
 };
 

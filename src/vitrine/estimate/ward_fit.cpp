@@ -255,10 +255,12 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     std::vector<Rgbd> weight;
     const LobeFit best = fit_lobe(model, columns, bright, true, {}, &weight);
     fit.cost = best.cost;
+    fit.cost_with_clipped = best.objective;
     fit.ward.rho_d = best.rho_d;
     fit.ward.rho_s = best.rho_s;
     const LobeFit diffuse = fit_lobe(model, columns, bright, false);
     fit.cost_diffuse = diffuse.cost;
+    fit.cost_diffuse_with_clipped = diffuse.objective;
     fit.albedo = diffuse.rho_d.min(1.0f);
     fit.sigma.residual_rms = fit.cost;
     double lobe = 0.0, all = 1e-12;
