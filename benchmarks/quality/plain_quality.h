@@ -18,6 +18,7 @@ struct RenderQualityOptions {
     int samples = 16;
     double crease_deg = kCreaseDeg, object_crease_deg = kCreaseDeg;
     bool has_second_seed = false;
+    int path_samples = 0;
     std::vector<std::string> frames;
     DifferentialOptions differential;
 

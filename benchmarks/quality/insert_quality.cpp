@@ -1,0 +1,290 @@
+#include "insert_quality.h"
+
+#include "base/timer.h"
+#include "compose/composite.h"
+#include "image/filter.h"
+#include "image/image_io.h"
+#include "lamp_glints.h"
+
+#include <cstdio>
+
+namespace vitrine {
+namespace {
+namespace fs = std::filesystem;
+
+Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
+
+constexpr double kBlurPx = 2.0;
+
+/// Clipped as the camera does, then with - without.
+ImageRgb raw_difference(const ImageRgb& with, const ImageRgb& without, float top) {
+    ImageRgb d(with.width(), with.height());
+    for (std::size_t i = 0; i < d.size(); ++i) {
+        d[i] = clipped(with[i], top) - clipped(without[i], top);
+    }
+    return d;
+}
+
+/// Variance of the pixel noise of `error`, from how each pixel differs from its four neighbours
+/// (what is smooth drops out), and what the blur leaves of it.
+ImageRgb blurred_noise_variance(const ImageRgb& error) {
+    ImageRgb variance(error.width(), error.height());
+    for (int y = 1; y + 1 < error.height(); ++y) {
+        for (int x = 1; x + 1 < error.width(); ++x) {
+            const Rgb around =
+                (error(x - 1, y) + error(x + 1, y) + error(x, y - 1) + error(x, y + 1)) / 4.0f;
+            variance(x, y) = (error(x, y) - around).square() /
+                             static_cast<float>(1.25 * 4 * kPi * kBlurPx * kBlurPx);
+        }
+    }
+    return variance;
+}
+
+struct RegionError {
+    double error = 0;
+    double floor = 0;  ///< the truth's noise far from any change
+    double noise = 0;  ///< that of both pictures within the region
+    std::size_t count = 0;
+};
+
+RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double noise_rms,
+                         const ImageRgb& noise_variance, const Mask& inside) {
+    double difference = 0, power = 0, noise = 0;
+    RegionError result;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        if (inside[i] < 128) continue;
+        difference += (estimate[i] - truth[i]).square().sum();
+        power += truth[i].square().sum();
+        noise += noise_variance[i].sum();
+        ++result.count;
+    }
+    if (power > 0) {
+        result.noise = std::sqrt(noise / power);
+        result.error = std::sqrt(difference / power);
+        result.floor = noise_rms * std::sqrt(3.0 * static_cast<double>(result.count) / power);
+    }
+    return result;
+}
+
+/// Root mean square of the true difference where the estimate says that nothing changed.
+double noise_rms(const ImageRgb& truth, const ImageRgb& estimate, double level) {
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+        if (estimate[i].abs().maxCoeff() > 0.002 * level) continue;
+        sum += truth[i].square().sum();
+        count += 3;
+    }
+    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+}
+
+/// One frame: pictures of the change and the regions it falls into.
+struct TrueFrame {
+    Camera camera;
+    ImageRgb plate, with;  // of the truth
+    ImageRgb raw_true, d_true;
+    double level = 0;
+    Mask regions[4];  // see kRegionNames
+};
+const char* const kRegionNames[4] = {"object", "darker", "brighter", "all"};
+
+TrueFrame read_frame(const fs::path& folder, const Camera& camera, float top) {
+    TrueFrame frame;
+    frame.camera = camera;
+    frame.plate = read_exr_rgb(folder / ".." / "linear" / (camera.id + ".exr"));
+    frame.with = read_exr_rgb(folder / (camera.id + "_with.exr"));
+    frame.raw_true = raw_difference(frame.with, frame.plate, top);
+    frame.d_true = gaussian_blur(frame.raw_true, kBlurPx);
+    for (const Rgb& p : frame.plate) frame.level += clipped(p, top).mean();
+    frame.level /= static_cast<double>(frame.plate.size());
+    const Mask virtual_mask = read_mask(folder / (camera.id + "_virtual_mask.png"));
+    const Mask around = dilate(virtual_mask, 4);
+    frame.regions[0] = erode(virtual_mask, 2);
+    for (int k = 1; k < 4; ++k) frame.regions[k] = Mask(camera.width, camera.height);
+    for (std::size_t i = 0; i < around.size(); ++i) {
+        frame.regions[3][i] = 255;
+        if (around[i] >= 128 || !(frame.d_true[i].abs().maxCoeff() > 0.02 * frame.level)) continue;
+        frame.regions[frame.d_true[i].sum() < 0 ? 1 : 2][i] = 255;
+    }
+    return frame;
+}
+
+/// Sum over the region of the product of two errors.
+double product(const ImageRgb& a, const ImageRgb& b, const ImageRgb& c, const ImageRgb& d,
+               const Mask& region) {
+    double sum = 0;
+    for (std::size_t i = 0; i < region.size(); ++i) {
+        if (region[i] > 127) sum += ((a[i] - b[i]) * (c[i] - d[i])).sum();
+    }
+    return sum;
+}
+
+void print_errors(const TrueFrame& frame, const char* name, const ImageRgb& d, double noise,
+                  const ImageRgb& noise_variance) {
+    std::printf("%s %s: error (floor far off, noise in place)", frame.camera.id.c_str(), name);
+    for (int k = 0; k < 4; ++k) {
+        const RegionError e =
+            region_error(frame.d_true, d, noise, noise_variance, frame.regions[k]);
+        std::printf("  %s %.3f (%.3f, %.3f)", kRegionNames[k], e.error, e.floor, e.noise);
+    }
+    std::printf("\n");
+}
+
+/// Two pictures of ours with different random numbers, and one of paths alone, tell whose the error
+/// is: (first - truth) (second - truth) keeps what is not our noise, (first - truth) (second -
+/// paths) what is neither of the noises, which is our bias.
+void print_shares(const TrueFrame& frame, const ImageRgb& first, const ImageRgb& second,
+                  const ImageRgb* paths) {
+    std::printf("%s whose error it is:", frame.camera.id.c_str());
+    for (int k = 0; k < 3; ++k) {
+        const Mask& region = frame.regions[k];
+        double power = 0;
+        for (std::size_t i = 0; i < region.size(); ++i) {
+            if (region[i] > 127) power += frame.d_true[i].square().sum();
+        }
+        const auto root = [&](double square) {
+            return std::copysign(std::sqrt(std::abs(square) / power), square);
+        };
+        const double own = 0.5 * product(first, second, first, second, region);
+        const double rest = product(first, frame.d_true, second, frame.d_true, region);
+        std::printf("  %s our noise %.3f, without it %.3f", kRegionNames[k], root(own), root(rest));
+        if (!paths) continue;
+        const double bias = 0.5 * (product(first, frame.d_true, second, *paths, region) +
+                                   product(second, frame.d_true, first, *paths, region));
+        std::printf(" (truth's own %.3f, our bias %+.3f)", root(rest - bias), root(bias));
+    }
+    std::printf("\n");
+}
+
+/// The change by paths alone: no photons, nothing averaged. Not clipped, since clipped noise is
+/// darker noise; where the camera saturates, ours stands for it.
+ImageRgb change_by_paths(const TruthScene& truth, const Part& part, const Camera& camera,
+                         int samples, const DifferentialImage& ours, float top) {
+    FinalOptions options;
+    options.samples_per_pixel = samples;
+    options.use_photons = false;
+    options.seed = 1000;
+    Scene scene = truth.scene;
+    scene.parts.push_back(part);
+    scene.parts.back().is_virtual = false;
+    const ImageRgb with = render_image(RenderScene(scene), camera, options).radiance;
+    const ImageRgb without = render_image(RenderScene(truth.scene), camera, options).radiance;
+    ImageRgb change = raw_difference(ours.with, ours.without, top);
+    for (std::size_t i = 0; i < change.size(); ++i) {
+        const float brightest = std::max(ours.with[i].maxCoeff(), ours.without[i].maxCoeff());
+        if (brightest < 0.7f * top) change[i] = with[i] - without[i];
+    }
+    return gaussian_blur(change, kBlurPx);
+}
+
+/// Glints of the lamps within the object: what is there for certain, and what the truth's paths
+/// found of it.
+void print_glints(const TrueFrame& frame, const RenderScene& scene, const DifferentialImage& image,
+                  const ImageRgb& d, const ImageRgb& noise_variance, float top) {
+    const Mask& object = frame.regions[0];
+    const ImageRgb lamps = lamps_in_glass(scene, frame.camera, object);
+    Mask glints(object.width(), object.height());
+    double certain = 0, in_truth = 0, in_ours = 0, quantum = 1e30;
+    std::size_t count = 0, empty_true = 0;
+    for (std::size_t i = 0; i < glints.size(); ++i) {
+        if (object[i] < 128 || !(lamps[i][1] > 0.05f * top)) continue;
+        glints[i] = 255;
+        ++count;
+        certain += lamps[i][1];
+        const float base = frame.plate[i][1];
+        in_truth += frame.with[i][1] - base;
+        in_ours += image.with[i][1] - base;
+        if (frame.with[i][1] > 2 * top) {
+            quantum = std::min(quantum, double(frame.with[i][1] - base));
+        } else {
+            empty_true += frame.with[i][1] < base + 0.05f * top ? 1 : 0;
+        }
+    }
+    if (count == 0 || quantum > 1e29) return;
+    const Mask near_glint = dilate(glints, 6);
+    Mask calm = object;
+    double power = 0;
+    for (std::size_t i = 0; i < calm.size(); ++i) {
+        if (near_glint[i] > 127) calm[i] = 0;
+        if (object[i] > 127) power += frame.d_true[i].square().sum();
+    }
+    const double noise = glint_noise(frame.plate, lamps, object, quantum, top, kBlurPx);
+    std::printf(
+        "%s glints: %zu pixels show a lamp by more than 5 %% of white when all branches are "
+        "followed, %zu of them nothing in the truth; radiance summed: certain %.1f, ours %.1f, "
+        "truth %.1f; least of a pixel that found one %.1f: paths of that worth make the truth's "
+        "own error %.3f; off glints ours is %.3f\n",
+        frame.camera.id.c_str(), count, empty_true, certain, in_ours, in_truth, quantum,
+        noise / std::sqrt(power), region_error(frame.d_true, d, 0, noise_variance, calm).error);
+}
+
+}  // namespace
+
+void compare_insertion(const RenderQualityOptions& options, const TruthScene& truth) {
+    const fs::path folder = fs::path(options.capture) / "truth" / options.insert;
+    if (!fs::exists(folder / "insert.json")) return;
+    std::vector<Camera> cameras;
+    for (const Camera& camera : truth.scene.cameras) {
+        const bool is_there = fs::exists(folder / (camera.id + "_with.exr"));
+        if (is_there && options.takes(camera.id)) cameras.push_back(camera);
+    }
+    if (cameras.empty()) return;
+    const Part part = read_truth_insert(folder, options.object_crease_deg);
+    const bool needs_second = options.has_second_seed || options.path_samples > 0;
+    Timer timer;
+    const DifferentialRenderer renderer(truth.scene, {part}, cameras, options.differential);
+    std::optional<DifferentialRenderer> second;
+    if (needs_second) {
+        DifferentialOptions other = options.differential;
+        ++other.seed;
+        second.emplace(truth.scene, std::vector<Part>{part}, cameras, other);
+    }
+    std::printf("%s: photons %.1f s, met %.3f\n", options.insert.c_str(), timer.seconds(),
+                static_cast<double>(renderer.photon_balance().met) /
+                    static_cast<double>(renderer.photon_balance().shot));
+    const auto top = static_cast<float>(truth.linear_scale);
+    for (const Camera& camera : cameras) {
+        const TrueFrame frame = read_frame(folder, camera, top);
+        timer = Timer();
+        const DifferentialImage image = renderer.render(camera);
+        const double seconds = timer.seconds();
+        const auto change_of = [&](const DifferentialImage& picture) {
+            return gaussian_blur(raw_difference(picture.with, picture.without, top), kBlurPx);
+        };
+        const ImageRgb picture = composite(frame.plate, image);
+        const ImageRgb d_render = change_of(image);
+        const ImageRgb d_composite =
+            gaussian_blur(raw_difference(picture, frame.plate, top), kBlurPx);
+        ImageRgb raw_error = raw_difference(image.with, image.without, top);
+        for (std::size_t i = 0; i < raw_error.size(); ++i) raw_error[i] -= frame.raw_true[i];
+        const ImageRgb noise_variance = blurred_noise_variance(raw_error);
+        const double noise = noise_rms(frame.d_true, d_render, frame.level);
+        print_errors(frame, "rendered ", d_render, noise, noise_variance);
+        print_errors(frame, "composite", d_composite, noise, noise_variance);
+        if (second) {
+            std::optional<ImageRgb> paths;
+            if (options.path_samples > 0) {
+                paths = change_by_paths(truth, part, camera, options.path_samples, image, top);
+            }
+            print_shares(frame, d_render, change_of(second->render(camera)),
+                         paths ? &*paths : nullptr);
+        }
+        if (std::holds_alternative<Dielectric>(part.material)) {
+            print_glints(frame, renderer.scene(), image, d_render, noise_variance, top);
+        }
+        std::printf("%s rendered in %.1f s\n", camera.id.c_str(), seconds);
+        std::fflush(stdout);
+        if (options.out.empty()) continue;
+        const fs::path out = options.out;
+        const std::string stem = camera.id + "_" + options.insert;
+        write_side_by_side(out / (stem + ".png"), {picture, frame.with}, truth.linear_scale);
+        ImageRgb error(frame.plate.width(), frame.plate.height());
+        for (std::size_t i = 0; i < error.size(); ++i) {
+            error[i] = 0.5f * top + 4.0f * (d_composite[i] - frame.d_true[i]);
+        }
+        write_side_by_side(out / (stem + "_error.png"), {error}, truth.linear_scale);
+        write_composite_exr(out / (stem + ".exr"), frame.plate, image, camera);
+    }
+}
+
+}  // namespace vitrine
