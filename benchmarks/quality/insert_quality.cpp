@@ -109,13 +109,33 @@ TrueFrame read_frame(const fs::path& folder, const Camera& camera, float top) {
     return frame;
 }
 
-/// Sum over the region of the product of two errors.
-double product(const ImageRgb& a, const ImageRgb& b, const ImageRgb& c, const ImageRgb& d,
-               const Mask& region) {
-    double sum = 0;
-    for (std::size_t i = 0; i < region.size(); ++i) {
-        if (region[i] > 127) sum += ((a[i] - b[i]) * (c[i] - d[i])).sum();
+/// A sum over a region and its standard error, by how its tiles of 16 x 16 pixels differ: errors of
+/// tiles are independent, those of neighbours are blurred into each other.
+struct Sum {
+    double value = 0, deviation = 0;
+};
+/// Of `term(i)` over the pixels of the region.
+template <typename Term>
+Sum sum_of(const Mask& region, const Term& term) {
+    constexpr int kTile = 16;
+    const int columns = (region.width() + kTile - 1) / kTile;
+    const int rows = (region.height() + kTile - 1) / kTile;
+    std::vector<double> tiles(static_cast<std::size_t>(columns * rows), 0.0);
+    for (int y = 0; y < region.height(); ++y) {
+        for (int x = 0; x < region.width(); ++x) {
+            if (region(x, y) < 128) continue;
+            tiles[static_cast<std::size_t>(y / kTile * columns + x / kTile)] +=
+                term(static_cast<std::size_t>(y) * static_cast<std::size_t>(region.width()) +
+                     static_cast<std::size_t>(x));
+        }
     }
+    Sum sum;
+    double square = 0;
+    for (const double tile : tiles) {
+        sum.value += tile;
+        square += tile * tile;
+    }
+    sum.deviation = std::sqrt(square);
     return sum;
 }
 
@@ -133,33 +153,48 @@ void print_errors(const TrueFrame& frame, const char* name, const ImageRgb& d, d
 /// Two pictures of ours with different random numbers, and one of paths alone, tell whose the error
 /// is: (first - truth) (second - truth) keeps what is not our noise, (first - truth) (second -
 /// paths) what is neither of the noises, which is our bias.
+/// @param window pixels in which the picture of paths is known
 void print_shares(const TrueFrame& frame, const ImageRgb& first, const ImageRgb& second,
-                  const ImageRgb* paths) {
-    std::printf("%s whose error it is:", frame.camera.id.c_str());
+                  const ImageRgb* paths, const Mask& window) {
+    const ImageRgb& truth = frame.d_true;
     for (int k = 0; k < 3; ++k) {
-        const Mask& region = frame.regions[k];
-        double power = 0;
-        for (std::size_t i = 0; i < region.size(); ++i) {
-            if (region[i] > 127) power += frame.d_true[i].square().sum();
-        }
-        const auto root = [&](double square) {
-            return std::copysign(std::sqrt(std::abs(square) / power), square);
+        Mask region = frame.regions[k];
+        for (std::size_t i = 0; i < region.size(); ++i) region[i] = std::min(region[i], window[i]);
+        const auto product = [&](const ImageRgb& a, const ImageRgb& b, const ImageRgb& c,
+                                 const ImageRgb& d) {
+            return sum_of(region,
+                          [&](std::size_t i) { return ((a[i] - b[i]) * (c[i] - d[i])).sum(); });
         };
-        const double own = 0.5 * product(first, second, first, second, region);
-        const double rest = product(first, frame.d_true, second, frame.d_true, region);
-        std::printf("  %s our noise %.3f, without it %.3f", kRegionNames[k], root(own), root(rest));
-        if (!paths) continue;
-        const double bias = 0.5 * (product(first, frame.d_true, second, *paths, region) +
-                                   product(second, frame.d_true, first, *paths, region));
-        std::printf(" (truth's own %.3f, our bias %+.3f)", root(rest - bias), root(bias));
+        const auto square = [&](const ImageRgb& a, const ImageRgb& b) {
+            return sum_of(frame.regions[k],
+                          [&](std::size_t i) { return (a[i] - b[i]).square().sum(); })
+                .value;
+        };
+        const double power =
+            sum_of(frame.regions[k], [&](std::size_t i) { return truth[i].square().sum(); }).value;
+        const double error = square(first, truth), own = 0.5 * square(first, second);
+        std::printf("%s whose error %s: all %.3f, our noise %.3f, without it %.3f",
+                    frame.camera.id.c_str(), kRegionNames[k], std::sqrt(error / power),
+                    std::sqrt(own / power), std::sqrt(std::max(0.0, error - own) / power));
+        if (paths) {
+            const Sum here = product(first, truth, second, truth);
+            const Sum bias = product(first, truth, second, *paths);
+            std::printf(
+                "; in the window, %.0f %% of the squared error: our bias %+.0f +- %.0f %% "
+                "of that",
+                100 * here.value / error, 100 * bias.value / here.value,
+                100 * bias.deviation / here.value);
+        }
+        std::printf("\n");
     }
-    std::printf("\n");
 }
 
 /// The change by paths alone: no photons, nothing averaged. Not clipped, since clipped noise is
-/// darker noise; where the camera saturates, ours stands for it.
+/// darker noise; where the camera saturates, and outside of the window, ours stands for it.
+/// @param window x, y, width, height
 ImageRgb change_by_paths(const TruthScene& truth, const Part& part, const Camera& camera,
-                         int samples, const DifferentialImage& ours, float top) {
+                         int samples, const std::array<int, 4>& window,
+                         const DifferentialImage& ours, float top) {
     FinalOptions options;
     options.samples_per_pixel = samples;
     options.use_photons = false;
@@ -167,12 +202,21 @@ ImageRgb change_by_paths(const TruthScene& truth, const Part& part, const Camera
     Scene scene = truth.scene;
     scene.parts.push_back(part);
     scene.parts.back().is_virtual = false;
-    const ImageRgb with = render_image(RenderScene(scene), camera, options).radiance;
-    const ImageRgb without = render_image(RenderScene(truth.scene), camera, options).radiance;
+    const auto [x0, y0, width, height] = window;
+    Camera part_of_it = camera;
+    part_of_it.cx -= x0;
+    part_of_it.cy -= y0;
+    part_of_it.width = width;
+    part_of_it.height = height;
+    const ImageRgb with = render_image(RenderScene(scene), part_of_it, options).radiance;
+    const ImageRgb without = render_image(RenderScene(truth.scene), part_of_it, options).radiance;
     ImageRgb change = raw_difference(ours.with, ours.without, top);
-    for (std::size_t i = 0; i < change.size(); ++i) {
-        const float brightest = std::max(ours.with[i].maxCoeff(), ours.without[i].maxCoeff());
-        if (brightest < 0.7f * top) change[i] = with[i] - without[i];
+    for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < width; ++x) {
+            const Rgb &a = ours.with(x0 + x, y0 + y), &b = ours.without(x0 + x, y0 + y);
+            if (a.max(b).maxCoeff() >= 0.7f * top) continue;
+            change(x0 + x, y0 + y) = with(x, y) - without(x, y);
+        }
     }
     return gaussian_blur(change, kBlurPx);
 }
@@ -263,11 +307,22 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
         print_errors(frame, "composite", d_composite, noise, noise_variance);
         if (second) {
             std::optional<ImageRgb> paths;
+            std::array<int, 4> window = {0, 0, camera.width, camera.height};
+            if (options.window.size() == 4) std::copy_n(options.window.begin(), 4, window.begin());
+            Mask in_window(camera.width, camera.height);
+            // What the blur brings in from outside is ours.
+            constexpr int kMargin = 6;
+            for (int y = window[1] + kMargin; y < window[1] + window[3] - kMargin; ++y) {
+                for (int x = window[0] + kMargin; x < window[0] + window[2] - kMargin; ++x) {
+                    in_window(x, y) = 255;
+                }
+            }
             if (options.path_samples > 0) {
-                paths = change_by_paths(truth, part, camera, options.path_samples, image, top);
+                paths =
+                    change_by_paths(truth, part, camera, options.path_samples, window, image, top);
             }
             print_shares(frame, d_render, change_of(second->render(camera)),
-                         paths ? &*paths : nullptr);
+                         paths ? &*paths : nullptr, in_window);
         }
         if (std::holds_alternative<Dielectric>(part.material)) {
             print_glints(frame, renderer.scene(), image, d_render, noise_variance, top);

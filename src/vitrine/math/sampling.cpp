@@ -98,13 +98,16 @@ float sinc_below_eighth(float square) {
 Vec2f sample_concentric_disc(const Vec2f& u) {
     const float x = 2.0f * u.x() - 1.0f, y = 2.0f * u.y() - 1.0f;
     if (x == 0.0f && y == 0.0f) return Vec2f::Zero();
-    const bool wide = std::abs(x) > std::abs(y);
-    const float r = wide ? x : y;
+    // Picked by index: no branch foretells which of two even chances it will be.
+    const float coordinates[2] = {y, x};
+    const std::size_t wide = std::abs(x) > std::abs(y) ? 1 : 0;
+    const float r = coordinates[wide];
     // Within an eighth of a turn of the nearer axis.
-    const float angle = 0.25f * kPif * (wide ? y / x : x / y), square = angle * angle;
-    const float along = r * cosine_below_eighth(square),
-                across = r * angle * sinc_below_eighth(square);
-    return wide ? Vec2f(along, across) : Vec2f(across, along);
+    const float angle = 0.25f * kPif * (coordinates[1 - wide] / r), square = angle * angle;
+    float point[2];
+    point[1 - wide] = r * cosine_below_eighth(square);
+    point[wide] = r * angle * sinc_below_eighth(square);
+    return {point[0], point[1]};
 }
 
 Vec3f sample_cosine_hemisphere(const Vec2f& u) {

@@ -49,8 +49,10 @@ void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) con
     State first;
     first.origin = origin;
     first.views = views;
+    wave.states.reserve(wave.tasks.size());
+    wave.rays.reserve(wave.tasks.size());
     for (std::size_t i = 0; i < wave.tasks.size(); ++i) {
-        wave.results[i] = PathPair();
+        wave.results[i].clear();
         first.path = static_cast<std::uint32_t>(i);
         first.direction = wave.tasks[i].sample.direction;
         wave.states.push_back(first);
@@ -105,7 +107,7 @@ void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const 
     const Frame frame(point.shading_normal);
     const Vec3f wo(0, 0, 1);
     for (std::size_t i = 0; i < tasks.size(); ++i) {
-        results[i] = PathPair();
+        results[i].clear();
         results[i].is_touched_ = is_in_one;
         if (views == 0) continue;
         State state;

@@ -64,6 +64,11 @@ class PathPair {
 
   private:
     friend class PathTracer;
+    /// As new; the second result is filled where they part.
+    void clear() {
+        with_ = PathResult();
+        is_touched_ = false;
+    }
     PathResult with_, without_;  // the second counts from where they part
     bool is_touched_ = false;
 };
@@ -87,10 +92,10 @@ struct CameraSample {
     PathSampler sampler;
     Vec3f direction;
 };
-inline CameraSample camera_sample(const CameraRays& rays, std::uint64_t seed, int x, int y,
+/// @param stream of the pixel: stream_key(seed, x, y)
+inline CameraSample camera_sample(const CameraRays& rays, std::uint64_t stream, int x, int y,
                                   int index) {
-    const PathSampler sampler(stream_key(seed, unsigned(x), unsigned(y)),
-                              static_cast<std::uint32_t>(index));
+    const PathSampler sampler(stream, static_cast<std::uint32_t>(index));
     const Vec2f jitter = sampler.pair(0, 0);
     return {sampler, rays.through(static_cast<float>(x) + (jitter.x() - 0.5f),
                                   static_cast<float>(y) + (jitter.y() - 0.5f))};

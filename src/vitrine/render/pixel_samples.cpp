@@ -69,6 +69,7 @@ void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>
     });
     for (int x = 0; x < sums.width(); ++x) {
         const PixelSums& pixel = sums(x, y);
+        const std::uint64_t stream = stream_key(seed_, unsigned(x), unsigned(y));
         int soft_left = soft_target(x, y) - pixel.soft_count;
         const int end = std::max(target(x, y), soft_target(x, y));
         for (int k = pixel.count; k < end; ++k) {
@@ -76,7 +77,7 @@ void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>
             const auto turn = static_cast<std::size_t>(k + x + 2 * y);
             const bool finds_soft = soft_left-- > 0;
             group.add(turn % tracers_.size(), x,
-                      {camera_sample(rays_, seed_, x, y, k),
+                      {camera_sample(rays_, stream, x, y, k),
                        {finds_soft, finds_soft ? 1 : light_samples}});
         }
     }

@@ -127,11 +127,12 @@ class ImageSampler {
                         });
         for (int x = 0; x < sums.width(); ++x) {
             const PixelSum& pixel = sums(x, y);
+            const std::uint64_t stream = stream_key(seed_, unsigned(x), unsigned(y));
             int soft_left = soft_target(x) - pixel.soft_count;
             const int end = target(x);
             for (int k = pixel.count; k < end; ++k) {
                 group.add(0, x,
-                          {camera_sample(rays_, seed_, x, y, k),
+                          {camera_sample(rays_, stream, x, y, k),
                            {soft_target(x) < 0 || soft_left-- > 0, 1}});
             }
         }
