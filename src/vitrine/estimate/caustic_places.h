@@ -1,5 +1,5 @@
-// estimate/caustic_places.h: the table where one clear object throws its shadow and its caustic, and
-// what lamps and an index make of it. Internal to estimate.
+// estimate/caustic_places.h: the table where one clear object throws its shadow and its caustic,
+// and what lamps and an index make of it. Internal to estimate.
 #pragma once
 
 #include "estimate/observations.h"

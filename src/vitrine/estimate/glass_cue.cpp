@@ -51,8 +51,7 @@ double GlassCue::operator()(const std::vector<DiscLight>& lamps, double caustic_
 
 double GlassCue::ior(double caustic_ior) const {
     if (through_.outcome != Outcome::Converged) return caustic_ior;
-    const double share =
-        square(through_.stddev) / (square(through_.stddev) + square(kCausticIor));
+    const double share = square(through_.stddev) / (square(through_.stddev) + square(kCausticIor));
     return through_.value + share * (caustic_ior - through_.value);
 }
 

@@ -9,8 +9,8 @@
 
 namespace vitrine {
 
-/// Its caustic and the view through it as one likelihood. The normals of a hull's lit half shift the
-/// index that a caustic asks for, so the caustic has one of its own, tied to the object's by a
+/// Its caustic and the view through it as one likelihood. The normals of a hull's lit half shift
+/// the index that a caustic asks for, so the caustic has one of its own, tied to the object's by a
 /// normal density; the object's is then eliminated in closed form.
 class GlassCue {
   public:

@@ -16,13 +16,17 @@ Rgb with_share(const Rgb& stddev, const Rgb& value, double constant, double rati
 
 }  // namespace
 
-void add_model_error(TransparentFit& solid, const TransparentOptions& options) {
-    if (!options.known_ior)
-        solid.ior.stddev = std::hypot(solid.ior.stddev, kModelIorPerCost * solid.cost);
-    if (!options.known_sigma_a)
+void add_model_error(TransparentFit& solid, const TransparentOptions& options,
+                     const Rgb& absorption_per_ior) {
+    const double ior = options.known_ior ? 0.0 : kModelIorPerCost * solid.cost;
+    solid.ior.stddev = std::hypot(solid.ior.stddev, ior);
+    if (!options.known_sigma_a) {
+        solid.sigma_a_per_m.stddev =
+            with_share(solid.sigma_a_per_m.stddev, absorption_per_ior.abs(), 0.0, ior);
         solid.sigma_a_per_m.stddev =
             with_share(solid.sigma_a_per_m.stddev, solid.sigma_a_per_m.value, kModelAbsorption,
                        kModelAbsorptionRatio);
+    }
 }
 
 void add_model_error(WardFit& fit, double light_stddev) {

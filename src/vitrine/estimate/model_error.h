@@ -42,7 +42,11 @@ constexpr double kModelRhoDPerRhoS = 0.01;  // what the lobe mirrors is not know
 constexpr double kModelLogRhoD = 0.02;
 constexpr double kModelLogRhoS = 0.065;
 
-void add_model_error(TransparentFit& solid, const TransparentOptions& options);
+/// @param absorption_per_ior how the absorption fitted changes with the index: what the index is
+/// off
+///   by goes on into it
+void add_model_error(TransparentFit& solid, const TransparentOptions& options,
+                     const Rgb& absorption_per_ior);
 /// @param light_stddev of the irradiance, relative: what is measured is its product with a
 ///   reflectance
 void add_model_error(WardFit& fit, double light_stddev);

@@ -253,6 +253,21 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     fit.explained = share_explained(best);
     fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
 
+    // Between the trials around the best, far enough apart to be more than noise.
+    const auto absorption_slope = [&]() {
+        constexpr double kNear = 0.01;
+        std::size_t below = trial.size(), above = trial.size();
+        for (std::size_t k = 0; k < trial.size(); ++k) {
+            if (trial[k] < best_ior - kNear && (below == trial.size() || trial[k] > trial[below]))
+                below = k;
+            if (trial[k] > best_ior + kNear && (above == trial.size() || trial[k] < trial[above]))
+                above = k;
+        }
+        if (below == trial.size() || above == trial.size()) return Rgb(Rgb::Zero());
+        return Rgb((sigma_for(predicted[above], {}) - sigma_for(predicted[below], {})) /
+                   static_cast<float>(trial[above] - trial[below]));
+    };
+
     // Bootstrap over views among the trials already traced, with a parabola between them.
     std::vector<double> iors;
     std::array<std::vector<double>, 3> sigmas;
@@ -282,7 +297,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     for (int c = 0; c < 3 && !options.known_sigma_a; ++c)
         fit.sigma_a_per_m.stddev[c] =
             static_cast<float>(standard_deviation(sigmas[static_cast<std::size_t>(c)]));
-    add_model_error(fit, options);
+    add_model_error(fit, options, absorption_slope());
     fit.sigma_a_per_m.outcome = Outcome::Converged;
     if (options.known_ior) fit.ior.outcome = Outcome::Converged;
     if (fit.explained < kMinExplained) {
@@ -295,6 +310,11 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     } else if (!options.known_ior && fit.ior.stddev > 0.1) {
         fit.ior.outcome = Outcome::Ambiguous;
         fit.ior.reason = "different views ask for different indices";
+        if (!options.known_sigma_a) {
+            fit.sigma_a_per_m.outcome = Outcome::Ambiguous;
+            fit.sigma_a_per_m.reason =
+                "the ways through it depend on its index, which is ambiguous";
+        }
     }
     return fit;
 }

@@ -1,5 +1,6 @@
 #include "estimate/transparent.h"
 
+#include "estimate/model_error.h"
 #include "estimate/object_pixels.h"
 #include "geometry/primitives.h"
 #include "render/estimation_refraction.h"
@@ -119,6 +120,26 @@ TEST(FitSolid, AnswersOnTheGridAskedFor) {
     options.ior_step = 0.02;
     const TransparentFit fit = Ball(1.463, Rgb::Zero(), 1.0f).fit(options);
     EXPECT_NEAR(fit.ior.value, 1.46, 1e-9);
+}
+
+TEST(FitSolid, TheDoubtOfTheIndexGoesOnIntoTheAbsorption) {
+    TransparentFit fit;
+    fit.cost = 0.04;
+    fit.sigma_a_per_m.value = Rgb(1, 2, 3);
+    TransparentFit steep = fit, known = fit;
+    add_model_error(fit, {}, Rgb::Zero());
+    add_model_error(steep, {}, Rgb(0, 50, -50));
+    TransparentOptions options;
+    options.known_ior = 1.5;
+    add_model_error(known, options, Rgb(0, 50, -50));
+    EXPECT_GT(fit.ior.stddev, 0.0);
+    EXPECT_EQ(known.ior.stddev, 0.0);
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_EQ(known.sigma_a_per_m.stddev[c], fit.sigma_a_per_m.stddev[c]);
+        EXPECT_NEAR(steep.sigma_a_per_m.stddev[c],
+                    std::hypot(fit.sigma_a_per_m.stddev[c], c == 0 ? 0.0 : 50 * fit.ior.stddev),
+                    1e-4);
+    }
 }
 
 TEST(FitShell, RecoversItsOwnWall) {
