@@ -176,7 +176,7 @@ void print_shares(const TrueFrame& frame, const ImageRgb& first, const ImageRgb&
         std::printf("%s whose error %s: all %.3f, our noise %.3f, without it %.3f",
                     frame.camera.id.c_str(), kRegionNames[k], std::sqrt(error / power),
                     std::sqrt(own / power), std::sqrt(std::max(0.0, error - own) / power));
-        if (paths) {
+        if (paths && count_inside(region) > 0) {
             const Sum here = product(first, truth, second, truth);
             const Sum bias = product(first, truth, second, *paths);
             std::printf(
@@ -189,12 +189,35 @@ void print_shares(const TrueFrame& frame, const ImageRgb& first, const ImageRgb&
     }
 }
 
+/// Mean change over the window, green, not clipped: deviations by the spread of pixels (truth) or
+/// of paths.
+void print_window(const RenderedImage& with, const RenderedImage& without,
+                  const DifferentialImage& ours, const TrueFrame& frame,
+                  const std::array<int, 4>& window) {
+    double truth = 0, square = 0, own = 0, paths = 0, variance = 0;
+    const double n = double(window[2]) * double(window[3]);
+    for (int y = 0; y < window[3]; ++y) {
+        for (int x = 0; x < window[2]; ++x) {
+            const int u = window[0] + x, v = window[1] + y;
+            const double change = frame.with(u, v)[1] - frame.plate(u, v)[1];
+            truth += change / n;
+            square += change * change / n;
+            own += (ours.with(u, v)[1] - ours.without(u, v)[1]) / n;
+            paths += (with.radiance(x, y)[1] - without.radiance(x, y)[1]) / n;
+            variance += (with.variance(x, y) + without.variance(x, y)) / (n * n);
+        }
+    }
+    std::printf("%s mean change in the window: truth %.4f +- %.4f, ours %.4f, paths %.4f +- %.4f\n",
+                frame.camera.id.c_str(), truth, std::sqrt((square - truth * truth) / n), own, paths,
+                std::sqrt(variance));
+}
+
 /// The change by paths alone: no photons, nothing averaged. Not clipped, since clipped noise is
 /// darker noise; where the camera saturates, and outside of the window, ours stands for it.
 /// @param window x, y, width, height
 ImageRgb change_by_paths(const TruthScene& truth, const Part& part, const Camera& camera,
                          int samples, const std::array<int, 4>& window,
-                         const DifferentialImage& ours, float top) {
+                         const DifferentialImage& ours, const TrueFrame& frame, float top) {
     FinalOptions options;
     options.samples_per_pixel = samples;
     options.use_photons = false;
@@ -208,16 +231,17 @@ ImageRgb change_by_paths(const TruthScene& truth, const Part& part, const Camera
     part_of_it.cy -= y0;
     part_of_it.width = width;
     part_of_it.height = height;
-    const ImageRgb with = render_image(RenderScene(scene), part_of_it, options).radiance;
-    const ImageRgb without = render_image(RenderScene(truth.scene), part_of_it, options).radiance;
+    const RenderedImage with = render_image(RenderScene(scene), part_of_it, options);
+    const RenderedImage without = render_image(RenderScene(truth.scene), part_of_it, options);
     ImageRgb change = raw_difference(ours.with, ours.without, top);
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
             const Rgb &a = ours.with(x0 + x, y0 + y), &b = ours.without(x0 + x, y0 + y);
             if (a.max(b).maxCoeff() >= 0.7f * top) continue;
-            change(x0 + x, y0 + y) = with(x, y) - without(x, y);
+            change(x0 + x, y0 + y) = with.radiance(x, y) - without.radiance(x, y);
         }
     }
+    print_window(with, without, ours, frame, window);
     return gaussian_blur(change, kBlurPx);
 }
 
@@ -318,8 +342,8 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
                 }
             }
             if (options.path_samples > 0) {
-                paths =
-                    change_by_paths(truth, part, camera, options.path_samples, window, image, top);
+                paths = change_by_paths(truth, part, camera, options.path_samples, window, image,
+                                        frame, top);
             }
             print_shares(frame, d_render, change_of(second->render(camera)),
                          paths ? &*paths : nullptr, in_window);

@@ -96,8 +96,8 @@ ImageF sphere_caustic(const ReferenceScene& reference, const Camera& camera, int
             double sum = 0;
             for (const Counts& part_of_it : counts) sum += part_of_it[i];
             if (sum <= 0) continue;
-            radiance(x, y) = static_cast<float>(sum / footprint(camera, x, y) *
-                                                table.albedo.mean() / kPi);
+            radiance(x, y) =
+                static_cast<float>(sum / footprint(camera, x, y) * table.albedo.mean() / kPi);
         }
     }
     return radiance;
