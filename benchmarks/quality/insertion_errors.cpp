@@ -8,6 +8,7 @@
 // virtual object, where it changes the picture much (its shadow, caustics) and where it changes it
 // little.
 #include "compose/composite.h"
+#include "differential_options.h"
 #include "image/colour.h"
 #include "image/filter.h"
 #include "image/image_io.h"
@@ -118,9 +119,7 @@ int run(int argc, char** argv) {
     app.add_option("--scale", options.scale, "Of the frame, to the camera's size");
     app.add_option("--white", options.white, "Radiance shown as white");
     app.add_option("--samples", options.render.min_samples, "See DifferentialOptions");
-    app.add_option("--max-samples", options.render.max_samples, "See DifferentialOptions");
-    app.add_option("--noise-target", options.render.noise_target, "See DifferentialOptions");
-    app.add_option("--photon-count", options.render.photon_count, "See DifferentialOptions");
+    add_differential_options(app, options.render);
     app.add_option("--reference-samples", options.reference_min_samples, "Paths, at least");
     app.add_option("--reference-max-samples", options.reference_max_samples, "Paths, at most");
     app.add_option("--reference-noise-target", options.reference_noise_target,

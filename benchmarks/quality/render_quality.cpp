@@ -1,6 +1,7 @@
 // vitrine_render_quality: renders the true scene of a synthetic capture, with and without its
 // virtual object, and compares with the pictures that another renderer made of it.
 #include "base/timer.h"
+#include "differential_options.h"
 #include "insert_quality.h"
 
 #include <CLI/CLI.hpp>
@@ -21,9 +22,7 @@ int run(int argc, char** argv) {
     app.add_option("--out", options.out, "Write pictures here");
     app.add_option("--samples", options.samples,
                    "Samples per pixel of the plain renders, at least");
-    app.add_option("--photon-count", options.differential.photon_count, "Photons shot");
-    app.add_option("--noise-target", options.differential.noise_target, "See DifferentialOptions");
-    app.add_option("--max-samples", options.differential.max_samples, "See DifferentialOptions");
+    add_differential_options(app, options.differential);
     app.add_option("--crease-deg", options.crease_deg, "Smooth the real parts below this angle");
     app.add_option("--object-crease-deg", options.object_crease_deg,
                    "Smooth the virtual object below this angle");

@@ -7,8 +7,8 @@
 // and quality, for comparisons.
 #include "compose/composite.h"
 #include "cpu_time.h"
+#include "differential_options.h"
 #include "image/image_io.h"
-#include "render/differential.h"
 #include "scene/insertion.h"
 
 #include <CLI/CLI.hpp>
@@ -102,9 +102,7 @@ int main(int argc, char** argv) {
     app.add_flag("--final", options.is_final, "One finished frame, not previews");
     app.add_option("--scale", options.scale, "Of the finished frame, to the camera's size");
     app.add_option("--samples", options.render.min_samples, "See DifferentialOptions");
-    app.add_option("--max-samples", options.render.max_samples, "See DifferentialOptions");
-    app.add_option("--noise-target", options.render.noise_target, "See DifferentialOptions");
-    app.add_option("--photon-count", options.render.photon_count, "See DifferentialOptions");
+    add_differential_options(app, options.render);
     app.add_option("--seed", options.render.seed, "Of photons and paths");
     app.add_option("--out", options.out, "Write the frame's parts here");
     CLI11_PARSE(app, argc, argv);
