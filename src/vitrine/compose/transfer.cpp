@@ -53,28 +53,35 @@ PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptio
     } else {
         TranslucencyLightOptions light_options = options.lights;
         light_options.softness = role == Role::Material ? options.softness : 1 - options.softness;
-        const auto estimate = [&] {
-            analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
-            analysis.lights = estimate_translucency_lights(
-                analysis.highlights.diffuse, analysis.relief, analysis.highlights.grown,
-                analysis.highlight_lights, light_options);
+        const auto estimate = [&](bool use_votes) {
+            light_options.use_votes = use_votes;
+            return estimate_translucency_lights(analysis.highlights.diffuse, analysis.relief,
+                                                analysis.highlights.grown,
+                                                analysis.highlight_lights, light_options);
         };
-        estimate();
-        const bool is_refined = role == Role::Material && !analysis.relief.is_cluster();
-        const int rounds = is_refined ? options.refinement_rounds : 0;
-        for (int round = 0; round < rounds; ++round) {
-            ReliefOptions dome = options.relief;
-            dome.alpha = 0;
-            analysis.relief =
-                refine_relief(shade_to_shape(analysis.highlights.diffuse, photo.mask, dome),
-                              analysis.highlights.diffuse, analysis.highlights.grown,
-                              analysis.lights.lights, analysis.lights.kernel_px, light_options.eta);
-            estimate();
-            progress.update(0.4 + 0.5 * (round + 1) / rounds, "shape and lights");
+        analysis.lights = estimate(true);
+        if (role == Role::Material && !analysis.relief.is_cluster()) {
+            progress.update(0.5, "shape and lights");
+            const std::vector<HighlightLight> seen = analysis.highlight_lights;
+            analysis.explaining = estimate(false);
+            for (int round = 0; round < options.refinement_rounds; ++round) {
+                ReliefOptions dome = options.relief;
+                dome.alpha = 0;
+                analysis.relief = refine_relief(
+                    shade_to_shape(analysis.highlights.diffuse, photo.mask, dome),
+                    analysis.highlights.diffuse, analysis.highlights.grown,
+                    analysis.explaining.lights, analysis.explaining.kernel_px, light_options.eta);
+                analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
+                analysis.explaining = estimate(false);
+                progress.update(0.5 + 0.5 * (round + 1) / options.refinement_rounds,
+                                "shape and lights");
+            }
+            analysis.highlight_lights = seen;
         }
     }
-    analysis.warnings.insert(analysis.warnings.end(), analysis.lights.warnings.begin(),
-                             analysis.lights.warnings.end());
+    if (analysis.explaining.lights.total() <= 0) analysis.explaining = analysis.lights;
+    analysis.warnings.insert(analysis.warnings.end(), analysis.explaining.warnings.begin(),
+                             analysis.explaining.warnings.end());
     return analysis;
 }
 
@@ -105,7 +112,8 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
     PhotoAnalysis& analysis = lifted.analysis;
     const ImageRgb shown = scaled_image(analysis.highlights.diffuse, 1 / analysis.white);
     const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points, double eta) {
-        return entering_light(lit, points, analysis.lights.lights, eta, options.bssrdf.use_shadows);
+        return entering_light(lit, points, analysis.explaining.lights, eta,
+                              options.bssrdf.use_shadows);
     };
     lifted.medium = estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, light,
                                     options.bssrdf, progress.part(0.6, 0.8));
@@ -122,7 +130,7 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
     TranslucentRenderOptions render_options;
     render_options.eta = lifted.medium.is_fresnel ? options.bssrdf.eta : 1.0;
     render_options.use_curved_body = options.bssrdf.use_curved_body;
-    lifted.rendered = render_object(analysis.relief, analysis.lights.lights,
+    lifted.rendered = render_object(analysis.relief, analysis.explaining.lights,
                                     lifted.medium.profile(), render_options);
     for (Rgb& pixel : lifted.rendered) pixel *= static_cast<float>(lifted.brightness);
     lifted.self_psnr_db =

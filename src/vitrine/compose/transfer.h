@@ -68,7 +68,10 @@ struct PhotoAnalysis {
     Highlights highlights;
     Relief relief;
     std::vector<HighlightLight> highlight_lights;  ///< heaviest first
-    ViewLightsEstimate lights;
+    ViewLightsEstimate lights;                     ///< where the lamps are
+    /// Of a material photo: the light under which R_d is read. Of one body it is not where the
+    /// lamps are but what explains the picture best on its inflated shape; else the same.
+    ViewLightsEstimate explaining;
     std::vector<std::string> warnings;
 };
 

@@ -1,5 +1,7 @@
 #include "estimate/few_lamps.h"
 
+#include "base/error.h"
+#include "base/parallel.h"
 #include "estimate/profile_fit.h"
 #include "math/nnls.h"
 
@@ -28,9 +30,10 @@ using LengthImages = std::vector<MatrixXd>;
 class Fit {
   public:
     Fit(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
-        const FewLampsOptions& options)
+        const std::vector<LampVote>& votes, const FewLampsOptions& options)
         : object_(object),
           ground_colour_(ground_colour),
+          votes_(votes),
           options_(options),
           y_(exitance),
           lengths_(length_grid(options.shortest_px, options.longest_px, options.length_count)) {
@@ -123,7 +126,7 @@ class Fit {
             for (int c = 0; c < kChannels; ++c)
                 moved[c].col(static_cast<Index>(l)) = operators[c](fields).col(0);
             solve_intensities(moved, trial);
-            if (trial.misfit >= lamps.misfit * (1 - 1e-3)) return false;
+            if (cost(trial) >= cost(lamps) - 5e-4 * options_.looks) return false;
             lamps = std::move(trial);
             images = std::move(moved);
             return true;
@@ -144,6 +147,23 @@ class Fit {
                 if (!has_moved) break;
             }
         }
+    }
+
+    /// Minus the log-likelihood, up to a constant (few_lamps.h).
+    double cost(const FewLamps& lamps) const {
+        const auto count = static_cast<double>(lamps.directions.size());
+        double sum = 0.5 * options_.looks * std::log(std::max(lamps.misfit, 1e-12)) +
+                     options_.lamp_cost * count;
+        for (const LampVote& vote : votes_) {
+            const double kappa = vote.concentration;
+            double density = 0;  // over that of a vote from anywhere
+            for (const Vec3& direction : lamps.directions)
+                density += 2 * kappa / (1 - std::exp(-2 * kappa)) *
+                           std::exp(kappa * (vote.direction.dot(direction) - 1));
+            sum -= vote.weight *
+                   std::log(options_.false_votes + (1 - options_.false_votes) * density / count);
+        }
+        return sum;
     }
 
     double relative_residual(const FewLamps& lamps) const {
@@ -245,6 +265,7 @@ class Fit {
 
     const LitRelief& object_;
     Rgbd ground_colour_;
+    const std::vector<LampVote>& votes_;
     const FewLampsOptions& options_;
     MatrixXd y_;  // exitance over its mean
     std::array<double, kChannels> mean_{};
@@ -254,7 +275,7 @@ class Fit {
 };
 
 /// Takes away the lamps that the picture hardly misses.
-void drop_needless(const Fit& fit, FewLamps& lamps, double needless) {
+void drop_needless(const Fit& fit, FewLamps& lamps) {
     for (std::size_t l = lamps.directions.size(); l-- > 0;) {
         if (lamps.seen_at[l] || lamps.directions.size() == 1) continue;
         std::vector<Vec3> fewer = lamps.directions;
@@ -262,17 +283,38 @@ void drop_needless(const Fit& fit, FewLamps& lamps, double needless) {
         fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(l));
         seen_at.erase(seen_at.begin() + static_cast<std::ptrdiff_t>(l));
         FewLamps without = fit.fit_kernels(fewer, seen_at);
-        if (without.misfit <= lamps.misfit * (1 + needless)) lamps = std::move(without);
+        if (fit.cost(without) <= fit.cost(lamps)) lamps = std::move(without);
     }
 }
 
-}  // namespace
+/// Two lamps side by side are mostly one, split by a shape that does not quite explain its
+/// shading: they are joined where the misfit hardly grows.
+void join_neighbours(const Fit& fit, FewLamps& lamps, const FewLampsOptions& options) {
+    const auto joined_pair = [&]() -> std::optional<FewLamps> {
+        for (std::size_t i = 0; i < lamps.directions.size(); ++i) {
+            for (std::size_t j = i + 1; j < lamps.directions.size(); ++j) {
+                const Vec3 &a = lamps.directions[i], &b = lamps.directions[j];
+                if (lamps.seen_at[i] || lamps.seen_at[j]) continue;
+                if (angle_between(a, b) > radians(options.join_deg)) continue;
+                std::vector<Vec3> fewer = lamps.directions;
+                std::vector<SeenAt> seen_at = lamps.seen_at;
+                fewer[i] = (lamps.intensity[static_cast<Index>(i)] * a +
+                            lamps.intensity[static_cast<Index>(j)] * b)
+                               .normalized();
+                fewer.erase(fewer.begin() + static_cast<std::ptrdiff_t>(j));
+                seen_at.erase(seen_at.begin() + static_cast<std::ptrdiff_t>(j));
+                FewLamps joined = fit.fit_kernels(fewer, seen_at);
+                if (options.first_step_deg > 0) fit.move(joined, options.first_step_deg);
+                if (fit.cost(joined) <= fit.cost(lamps)) return joined;
+            }
+        }
+        return {};
+    };
+    while (const std::optional<FewLamps> joined = joined_pair()) lamps = *joined;
+}
 
-FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
-                       const std::vector<Vec3>& start, const std::vector<SeenAt>& seen_at,
-                       const FewLampsOptions& options) {
-    Fit fit(object, exitance, ground_colour, options);
-    FewLamps lamps = fit.fit_kernels(start, seen_at);
+FewLamps fit_from(Fit fit, const LampStart& start, const FewLampsOptions& options) {
+    FewLamps lamps = fit.fit_kernels(start.directions, start.seen_at);
     const auto settle = [&] {
         fit.set_bodies(lamps.kernel);
         fit.reweight(lamps);
@@ -281,13 +323,34 @@ FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const 
     settle();
     if (options.first_step_deg > 0) fit.move(lamps, options.first_step_deg);
     settle();
-    drop_needless(fit, lamps, options.needless);
+    drop_needless(fit, lamps);
+    join_neighbours(fit, lamps, options);
     if (options.first_step_deg > 0) {
         fit.move(lamps, 0.5 * options.first_step_deg);
         settle();
     }
     lamps.relative_residual = fit.relative_residual(lamps);
     return lamps;
+}
+
+}  // namespace
+
+FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
+                       const std::vector<LampStart>& starts, const std::vector<LampVote>& votes,
+                       const FewLampsOptions& options) {
+    VITRINE_CHECK(!starts.empty());
+    const Fit fit(object, exitance, ground_colour, votes, options);
+    std::vector<FewLamps> found(starts.size());
+    parallel_for(starts.size(), 1,
+                 [&](std::size_t k) { found[k] = fit_from(fit, starts[k], options); });
+    // Each has weights of its own: compared without.
+    const auto score = [&](FewLamps lamps) {
+        lamps.misfit = lamps.relative_residual * lamps.relative_residual;
+        return fit.cost(lamps);
+    };
+    return *std::min_element(found.begin(), found.end(), [&](const FewLamps& a, const FewLamps& b) {
+        return score(a) < score(b);
+    });
 }
 
 }  // namespace vitrine

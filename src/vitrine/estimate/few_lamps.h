@@ -18,12 +18,28 @@ struct FewLampsOptions {
     double ground_price = 0.04;   ///< of light from below
     double first_step_deg = 8;    ///< of the search for better directions; 0: none
     double held_reach_deg = 0;    ///< how far shading may move a lamp from where highlights show it
-    double needless = 0.02;       ///< a lamp without which the misfit grows by less goes
+    double looks = 50;            ///< independent looks at the object that the misfit counts for
+    double lamp_cost = 0.5;       ///< log-likelihood that a lamp must win to stay
+    double join_deg = 0;          ///< lamps closer than this may be one
+    double false_votes = 0.4;     ///< share of votes that no lamp cast
     bool use_curved_body = true;  ///< optics/curved_body.h
 };
 
 /// Where highlights show a lamp: it is there, for nothing, and within `held_reach_deg`.
 using SeenAt = std::optional<Vec3>;
+
+/// A highlight says where a lamp is, as well as the normal there is known.
+struct LampVote {
+    Vec3 direction = Vec3(0, 0, 1);
+    double weight = 1;         ///< at most 1
+    double concentration = 1;  ///< about its lamp (von Mises and Fisher)
+};
+
+/// Directions to begin with.
+struct LampStart {
+    std::vector<Vec3> directions;
+    std::vector<SeenAt> seen_at;  ///< of each
+};
 
 /// Lamps and kernels that explain the picture together. Light is white but for the ground's.
 struct FewLamps {
@@ -42,10 +58,15 @@ struct FewLamps {
 /// the same few white lamps must explain channels that scatter differently, which tells them apart.
 /// Kernels are found by variable projection (as in profile_fit.h) in turn with the intensities
 /// (non-negative least squares), from every length as a start; directions by pattern search.
+/// Directions and the number of lamps minimise
+///   looks / 2 ln(misfit) - sum_b weight_b ln p(vote_b | directions) + lamp_cost (lamps):
+/// shading and highlights together. Residuals come from errors of the shape, which are few and wide
+/// and which every lamp more explains a little: hence `looks`, not pixels. Of what several starts
+/// lead to, the best is taken.
 /// @param exitance observations x 3; a channel of zeros takes no part
-/// @param start directions to begin with
+/// @param starts at least one
 FewLamps fit_few_lamps(const LitRelief& object, const Eigen::MatrixXd& exitance,
-                       const Rgbd& ground_colour, const std::vector<Vec3>& start,
-                       const std::vector<SeenAt>& seen_at, const FewLampsOptions& options);
+                       const Rgbd& ground_colour, const std::vector<LampStart>& starts,
+                       const std::vector<LampVote>& votes, const FewLampsOptions& options);
 
 }  // namespace vitrine

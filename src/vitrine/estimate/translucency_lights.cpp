@@ -26,6 +26,14 @@ constexpr double kFewPrice = 0.3;
 /// Balls are round but for a few degrees, so that shading places lamps better than their mirror
 /// images do; on bumps that the relief lacks it does not. Half of what votes that agree may differ.
 constexpr double kClusterReachDeg = 6.0;
+/// What a picture of one body says of its lamps is limited by its shape, which is wrong in few and
+/// wide places: so many independent looks.
+constexpr double kLooksAtBody = 20.0;
+/// Two lamps nearer than this are mostly one, split by such errors.
+constexpr double kJoinDeg = 55.0;
+/// Of the normals of an inflated silhouette where they face us; less toward the outline.
+constexpr double kNormalError = radians(15.0);
+constexpr double kSurestVote = radians(12.0);
 /// Of the brightest channel's mean.
 constexpr double kDarkChannel = 0.05;
 
@@ -123,6 +131,55 @@ std::vector<ViewLight> merge_lights(const std::vector<Vec3>& directions, const V
         lights.push_back({group.sum.normalized(), Rgbd::Constant(group.intensity)});
     }
     return lights;
+}
+
+/// Highlights of a body, whose normals are known less well than those of balls.
+std::vector<LampVote> votes_of(std::span<const HighlightLight> highlight_lights) {
+    std::vector<LampVote> votes;
+    double heaviest = 1e-12;
+    for (const HighlightLight& light : highlight_lights) {
+        // At the outline the normal is known best, whatever a pixel more or less does.
+        const double weight =
+            luminance(light.intensity) / std::max(0.5 * (1 + light.direction.z()), 0.05);
+        heaviest = std::max(heaviest, weight);
+        // The outline gives the normal; what lies within is guessed the worse the more it faces us.
+        const double normal_z2 = 0.5 * (1 + light.direction.z());
+        const double spread = std::max(kSurestVote, 2 * kNormalError * std::sqrt(normal_z2));
+        votes.push_back({light.direction, weight, 1 / (spread * spread)});
+    }
+    // A lamp shows brightly here and faintly there.
+    for (LampVote& vote : votes) vote.weight = std::sqrt(vote.weight / heaviest);
+    return votes;
+}
+
+/// Directions about which most votes lie, each without those that the ones before explain.
+std::vector<Vec3> vote_modes(std::span<const LampVote> votes) {
+    std::vector<double> left;
+    for (const LampVote& vote : votes) left.push_back(vote.weight);
+    std::vector<Vec3> modes;
+    while (modes.size() < 3 && modes.size() < votes.size()) {
+        double most = 0;
+        Vec3 mode = Vec3::Zero();
+        for (const LampVote& centre : votes) {
+            double sum = 0;
+            Vec3 mean = Vec3::Zero();
+            for (std::size_t b = 0; b < votes.size(); ++b) {
+                const double w = left[b] * votes[b].concentration *
+                                 std::exp(votes[b].concentration *
+                                          (votes[b].direction.dot(centre.direction) - 1));
+                sum += w;
+                mean += w * votes[b].direction;
+            }
+            if (sum <= most) continue;
+            most = sum;
+            mode = mean.normalized();
+        }
+        if (most <= 0) break;
+        modes.push_back(mode);
+        for (std::size_t b = 0; b < votes.size(); ++b)
+            left[b] *= 1 - std::exp(votes[b].concentration * (votes[b].direction.dot(mode) - 1));
+    }
+    return modes;
 }
 
 /// Where several highlights agree on a lamp, that is where it is: lights near it go there.
@@ -300,8 +357,10 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
 
     result.lights.lights = merge_lights(directions, fits[best].intensity.head(count),
                                         options.merge_deg, options.max_lights);
-    std::vector<bool> is_held =
-        snap_to_highlights(result.lights.lights, highlight_lights, options.merge_deg);
+    const bool use_votes = options.use_votes && !relief.is_cluster();
+    std::vector<bool> is_held(result.lights.lights.size(), false);
+    if (!use_votes)
+        is_held = snap_to_highlights(result.lights.lights, highlight_lights, options.merge_deg);
 
     if (relief.is_cluster()) drop_unseen(result.lights.lights, is_held, highlight_lights);
 
@@ -315,14 +374,24 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     few.use_curved_body = options.use_curved_body;
     if (relief.is_cluster()) few.held_reach_deg = kClusterReachDeg;
     const Rgbd ground = ground_colour(diffuse, relief);
-    std::vector<Vec3> start;
-    std::vector<SeenAt> seen_at;
+    std::vector<LampStart> starts(1);
     for (std::size_t l = 0; l < is_held.size(); ++l) {
-        start.push_back(result.lights.lights[l].direction);
-        seen_at.push_back(is_held[l] ? SeenAt(start.back()) : std::nullopt);
+        const Vec3& direction = result.lights.lights[l].direction;
+        starts[0].directions.push_back(direction);
+        starts[0].seen_at.push_back(is_held[l] ? SeenAt(direction) : std::nullopt);
+    }
+    std::vector<LampVote> votes;
+    if (use_votes) {
+        votes = votes_of(highlight_lights);
+        few.looks = kLooksAtBody;
+        few.lamp_cost = 1.5 * std::log(few.looks);  // two angles and a strength (Schwarz 1978)
+        few.join_deg = kJoinDeg;
+        const std::vector<Vec3> modes = vote_modes(votes);
+        for (std::size_t k = 1; k < modes.size(); ++k)
+            starts.push_back({{modes[0], modes[k]}, {std::nullopt, std::nullopt}});
     }
     const FewLamps lamps =
-        fit_few_lamps(object, without_dark_channels(exitance), ground, start, seen_at, few);
+        fit_few_lamps(object, without_dark_channels(exitance), ground, starts, votes, few);
     progress.update(1.0, "lights: directions");
     set_lights(lamps, ground, result);
     if (result.lights.total() <= 0) {
@@ -332,7 +401,7 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         return result;
     }
     normalise_and_warn(result, relief, options.eta);
-    if (result.relative_residual > 0.25) {
+    if (result.relative_residual > (use_votes ? 0.3 : 0.25)) {
         result.outcome = Outcome::Ambiguous;
         result.reason = "the lighting could not be explained well";
         result.warnings.push_back(

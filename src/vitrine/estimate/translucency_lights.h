@@ -29,7 +29,10 @@ struct TranslucencyLightOptions {
     bool use_shadows = true;      ///< the object's own cast shadows
     bool use_curved_body = true;  ///< optics/curved_body.h, at the albedo kTypicalAlbedo
     bool use_ground = true;       ///< light thrown back by what the object stands on
-    std::uint64_t seed = 1;       ///< of the choice of pixels
+    /// Of one body: the likeliest lamps by shading and highlights together. False: the lamps that
+    /// explain its shading best on the shape as it is taken for, whose errors they take up.
+    bool use_votes = true;
+    std::uint64_t seed = 1;  ///< of the choice of pixels
 };
 
 struct ViewLightsEstimate {

@@ -278,8 +278,46 @@ TEST(TranslucencyLights, LampOfTwoHighlightsIsHeld) {
     lamp.direction = Vec3(-0.45, 0.6, 0.66).normalized();  // 4 degrees from the true one
     lamp.votes = 2;
     const std::vector<HighlightLight> lamps = {lamp};
-    const auto found = estimate_translucency_lights(world.diffuse, world.relief, Mask(), lamps);
+    const auto found = estimate_translucency_lights(world.diffuse, world.relief, Mask(), lamps,
+                                                    {.use_votes = false});
     EXPECT_LT(nearest_deg(found.lights, lamp.direction), 1e-6);
+}
+
+TEST(TranslucencyLights, HighlightsTellTheLampsWhereTheShapeIsWrong) {
+    World world;
+    // Waves of normals, 15 degrees wrong, that the picture does not have.
+    Relief wavy = world.relief;
+    for (int y = 0; y < wavy.mask.height(); ++y) {
+        for (int x = 0; x < wavy.mask.width(); ++x) {
+            float& z = wavy.depth_px(x, y);
+            z *= static_cast<float>(1 + 0.12 * std::sin(x / 9.0) * std::cos(y / 11.0 + 0.6));
+        }
+    }
+    wavy.normals = relief_normals(wavy.depth_px, wavy.mask);
+    // Each lamp mirrors three times, up to 20 degrees off where the surface faces us; one highlight
+    // is false.
+    const Vec3 key = world.lights.lights[0].direction, back = world.lights.lights[1].direction;
+    std::vector<HighlightLight> highlights;
+    const auto add = [&](const Vec3& lamp, const Vec3& off, double weight) {
+        HighlightLight light;
+        light.direction = (lamp + off).normalized();
+        light.intensity = Rgbd::Constant(weight);
+        highlights.push_back(light);
+    };
+    add(back, Vec3(0.05, 0.08, 0.0), 0.4);
+    add(key, Vec3(0.3, 0.05, -0.1), 0.15);
+    add(key, Vec3(-0.1, -0.3, 0.1), 0.15);
+    add(key, Vec3(-0.2, 0.2, 0.05), 0.1);
+    add(back, Vec3(-0.1, -0.05, 0.1), 0.1);
+    add(Vec3(0.2, -0.8, 0.4), Vec3::Zero(), 0.1);
+    const auto voted = estimate_translucency_lights(world.diffuse, wavy, Mask(), highlights);
+    EXPECT_LT(nearest_deg(voted.lights, key), 10);
+    EXPECT_LT(nearest_deg(voted.lights, back), 12);
+    EXPECT_EQ(voted.lights.lights.size(), 2u);
+    const auto shading =
+        estimate_translucency_lights(world.diffuse, wavy, Mask(), highlights, {.use_votes = false});
+    EXPECT_GT(nearest_deg(shading.lights, key) + nearest_deg(shading.lights, back),
+              nearest_deg(voted.lights, key) + nearest_deg(voted.lights, back));
 }
 
 TEST(TranslucencyLights, GroundIsFoundWhereItShines) {

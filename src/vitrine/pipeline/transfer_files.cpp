@@ -98,17 +98,19 @@ void write_lights_json(const std::filesystem::path& path, const PhotoAnalysis& a
         }
         return items;
     };
-    const ViewLightsEstimate& estimate = analysis.lights;
-    json["lights"] = list(estimate.lights.lights);
-    json["ambient_irradiance"] =
-        triple(estimate.lights.ambient[0], estimate.lights.ambient[1], estimate.lights.ambient[2]);
-    json["from_below_irradiance"] =
-        triple(estimate.lights.from_below[0], estimate.lights.from_below[1],
-               estimate.lights.from_below[2]);
+    const auto write_estimate = [&](Json& to, const ViewLightsEstimate& estimate) {
+        const Rgbd &ambient = estimate.lights.ambient, &below = estimate.lights.from_below;
+        to["lights"] = list(estimate.lights.lights);
+        to["ambient_irradiance"] = triple(ambient[0], ambient[1], ambient[2]);
+        to["from_below_irradiance"] = triple(below[0], below[1], below[2]);
+        to["relative_residual"] = estimate.relative_residual;
+        to["outcome"] = outcome_name(estimate.outcome);
+        to["reason"] = estimate.reason;
+    };
+    write_estimate(json, analysis.lights);
     json["highlight_lights"] = list(analysis.highlight_lights);
-    json["relative_residual"] = estimate.relative_residual;
-    json["outcome"] = outcome_name(estimate.outcome);
-    json["reason"] = estimate.reason;
+    // Under which R_d is read (compose/transfer.h).
+    write_estimate(json["explaining"], analysis.explaining);
     write_json_file(path, json);
 }
 

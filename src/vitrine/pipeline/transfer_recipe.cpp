@@ -64,7 +64,7 @@ void collect(TransferSummary& summary, const ReadyMaterial& material) {
     if (!material.lifted) return;
     summary.self_psnr_db = material.lifted->self_psnr_db;
     summary.flat_psnr_db = material.lifted->flat_psnr_db;
-    summary.is_uncertain |= material.lifted->analysis.lights.outcome != Outcome::Converged;
+    summary.is_uncertain |= material.lifted->analysis.explaining.outcome != Outcome::Converged;
     collect(summary, material.lifted->analysis.warnings);
 }
 

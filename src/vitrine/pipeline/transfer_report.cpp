@@ -171,7 +171,7 @@ std::string analysis_html(const ScratchFolder& scratch, const std::string& id,
             ? fmt::format("A cluster of {} balls. ", analysis.relief.balls.size())
             : "",
         analysis.relief.inradius_px, 100 * highlights.share, method,
-        100 * (1 - std::min(1.0, analysis.lights.relative_residual)));
+        100 * (1 - std::min(1.0, analysis.explaining.relative_residual)));
     return html + lights_table(analysis);
 }
 
