@@ -15,7 +15,8 @@ struct ObjectPixel {
     Vec3f eye = Vec3f::Zero();
     Vec3f direction = Vec3f::Zero();  ///< unit, away from the camera
     SurfacePoint surface;
-    float normal_variance = 0.0f;  ///< mean square turn of the normal within the pixel, rad^2
+    float normal_variance = 0.0f;  ///< mean square turn of the normal within the pixel, rad^2:
+                                   ///< twice that of the direction in which it turns least
     Rgb radiance = Rgb::Zero();
     bool is_clipped = false;            ///< this pixel or a neighbour, into which it may have bled
     std::array<bool, 3> is_at_least{};  ///< channels clipped in this very pixel

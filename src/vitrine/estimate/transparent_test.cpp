@@ -163,6 +163,27 @@ TEST(FitShell, SaysThatAnEvenBackgroundShowsNoWall) {
     EXPECT_TRUE(std::isfinite(fit.wall_m.value) && std::isfinite(fit.wall_m.stddev));
 }
 
+TEST(ObjectPixels, NormalsThatTurnOneWayOnlyWidenNoLobe) {
+    Ball ball(1.5, Rgb::Zero(), 1.0f);
+    const auto mean_variance = [&]() {
+        const EstimationScene world(ball.scene);
+        const FrameLookup lookup(world, ball.scene.cameras, ball.frames, 1e9);
+        double sum = 0.0;
+        const std::vector<ObjectPixel> pixels = object_pixels(world, lookup, 0);
+        for (const ObjectPixel& pixel : pixels) sum += pixel.normal_variance;
+        return sum / static_cast<double>(pixels.size());
+    };
+    const double of_ball = mean_variance();
+    EXPECT_GT(of_ball, 1e-4);
+    Mat4 lying = Mat4::Identity();
+    lying.topLeftCorner<3, 3>() << 0, 0, 1, 0, 1, 0, -1, 0, 0;
+    lying(0, 3) = -0.2;
+    lying(2, 3) = 0.031;
+    ball.scene.parts[1].mesh = std::make_shared<const Mesh>(
+        transformed(make_cylinder(0.03, 0.4, Vec3::Zero(), 96), lying));
+    EXPECT_LT(mean_variance(), 0.1 * of_ball);
+}
+
 TEST(RefractThrough, PassesABodyThatIsMetAgain) {
     constexpr double kRadius = 0.02;
     Mesh pair = make_sphere(kRadius, Vec3(-0.03, 0, 0), 96);
