@@ -313,24 +313,37 @@ void join_neighbours(const Fit& fit, FewLamps& lamps, const FewLampsOptions& opt
     while (const std::optional<FewLamps> joined = joined_pair()) lamps = *joined;
 }
 
-FewLamps fit_from(Fit fit, const LampStart& start, const FewLampsOptions& options) {
-    FewLamps lamps = fit.fit_kernels(start.directions, start.seen_at);
-    const auto settle = [&] {
-        fit.set_bodies(lamps.kernel);
-        fit.reweight(lamps);
-        lamps = fit.fit_kernels(lamps.directions, lamps.seen_at);
-    };
-    settle();
+/// Kernels and weights under the directions as they are.
+void settle(Fit& fit, FewLamps& lamps) {
+    fit.set_bodies(lamps.kernel);
+    fit.reweight(lamps);
+    lamps = fit.fit_kernels(lamps.directions, lamps.seen_at);
+}
+
+/// A start with its own weights.
+struct Candidate {
+    Fit fit;
+    FewLamps lamps;
+    /// Comparable between candidates: without their weights.
+    double cost() const {
+        FewLamps plain = lamps;
+        const double residual = fit.relative_residual(lamps);
+        plain.misfit = residual * residual;
+        return fit.cost(plain);
+    }
+};
+
+void polish(Candidate& candidate, const FewLampsOptions& options) {
+    auto& [fit, lamps] = candidate;
     if (options.first_step_deg > 0) fit.move(lamps, options.first_step_deg);
-    settle();
+    settle(fit, lamps);
     drop_needless(fit, lamps);
     join_neighbours(fit, lamps, options);
     if (options.first_step_deg > 0) {
         fit.move(lamps, 0.5 * options.first_step_deg);
-        settle();
+        settle(fit, lamps);
     }
     lamps.relative_residual = fit.relative_residual(lamps);
-    return lamps;
 }
 
 }  // namespace
@@ -339,18 +352,18 @@ FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const 
                        const std::vector<LampStart>& starts, const std::vector<LampVote>& votes,
                        const FewLampsOptions& options) {
     VITRINE_CHECK(!starts.empty());
-    const Fit fit(object, exitance, ground_colour, votes, options);
-    std::vector<FewLamps> found(starts.size());
-    parallel_for(starts.size(), 1,
-                 [&](std::size_t k) { found[k] = fit_from(fit, starts[k], options); });
-    // Each has weights of its own: compared without.
-    const auto score = [&](FewLamps lamps) {
-        lamps.misfit = lamps.relative_residual * lamps.relative_residual;
-        return fit.cost(lamps);
-    };
-    return *std::min_element(found.begin(), found.end(), [&](const FewLamps& a, const FewLamps& b) {
-        return score(a) < score(b);
+    std::vector<Candidate> candidates(
+        starts.size(), {Fit(object, exitance, ground_colour, votes, options), FewLamps()});
+    parallel_for(starts.size(), 1, [&](std::size_t k) {
+        auto& [fit, lamps] = candidates[k];
+        lamps = fit.fit_kernels(starts[k].directions, starts[k].seen_at);
+        settle(fit, lamps);
     });
+    Candidate& best = *std::min_element(
+        candidates.begin(), candidates.end(),
+        [](const Candidate& a, const Candidate& b) { return a.cost() < b.cost(); });
+    polish(best, options);
+    return best.lamps;
 }
 
 }  // namespace vitrine

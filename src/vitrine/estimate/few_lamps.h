@@ -61,8 +61,8 @@ struct FewLamps {
 /// Directions and the number of lamps minimise
 ///   looks / 2 ln(misfit) - sum_b weight_b ln p(vote_b | directions) + lamp_cost (lamps):
 /// shading and highlights together. Residuals come from errors of the shape, which are few and wide
-/// and which every lamp more explains a little: hence `looks`, not pixels. Of what several starts
-/// lead to, the best is taken.
+/// and which every lamp more explains a little: hence `looks`, not pixels. Of several starts the
+/// likeliest, kernels and intensities fitted, is followed.
 /// @param exitance observations x 3; a channel of zeros takes no part
 /// @param starts at least one
 FewLamps fit_few_lamps(const LitRelief& object, const Eigen::MatrixXd& exitance,
