@@ -48,38 +48,34 @@ PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptio
     progress.update(0.4, "lights");
     analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
     if (options.light_method == LightMethod::LopezMoreno) {
-        analysis.lights = estimate_lopez_moreno_lights(analysis.highlights.diffuse, analysis.relief,
-                                                       analysis.highlights.grown);
+        analysis.lights = analysis.explaining = estimate_lopez_moreno_lights(
+            analysis.highlights.diffuse, analysis.relief, analysis.highlights.grown);
     } else {
         TranslucencyLightOptions light_options = options.lights;
         light_options.softness = role == Role::Material ? options.softness : 1 - options.softness;
-        const auto estimate = [&](bool use_votes) {
+        const auto estimate = [&](std::span<const HighlightLight> seen, bool use_votes) {
             light_options.use_votes = use_votes;
             return estimate_translucency_lights(analysis.highlights.diffuse, analysis.relief,
-                                                analysis.highlights.grown,
-                                                analysis.highlight_lights, light_options);
+                                                analysis.highlights.grown, seen, light_options);
         };
-        analysis.lights = estimate(true);
+        analysis.lights = analysis.explaining = estimate(analysis.highlight_lights, true);
         if (role == Role::Material && !analysis.relief.is_cluster()) {
             progress.update(0.5, "shape and lights");
-            const std::vector<HighlightLight> seen = analysis.highlight_lights;
-            analysis.explaining = estimate(false);
+            analysis.explaining = estimate(analysis.highlight_lights, false);
+            ReliefOptions dome = options.relief;
+            dome.alpha = 0;
+            const Relief inflated = shade_to_shape(analysis.highlights.diffuse, photo.mask, dome);
             for (int round = 0; round < options.refinement_rounds; ++round) {
-                ReliefOptions dome = options.relief;
-                dome.alpha = 0;
                 analysis.relief = refine_relief(
-                    shade_to_shape(analysis.highlights.diffuse, photo.mask, dome),
-                    analysis.highlights.diffuse, analysis.highlights.grown,
+                    inflated, analysis.highlights.diffuse, analysis.highlights.grown,
                     analysis.explaining.lights, analysis.explaining.kernel_px, light_options.eta);
-                analysis.highlight_lights = highlight_lights(analysis.highlights, analysis.relief);
-                analysis.explaining = estimate(false);
+                analysis.explaining =
+                    estimate(highlight_lights(analysis.highlights, analysis.relief), false);
                 progress.update(0.5 + 0.5 * (round + 1) / options.refinement_rounds,
                                 "shape and lights");
             }
-            analysis.highlight_lights = seen;
         }
     }
-    if (analysis.explaining.lights.total() <= 0) analysis.explaining = analysis.lights;
     analysis.warnings.insert(analysis.warnings.end(), analysis.explaining.warnings.begin(),
                              analysis.explaining.warnings.end());
     return analysis;

@@ -324,17 +324,17 @@ void settle(Fit& fit, FewLamps& lamps) {
 struct Candidate {
     Fit fit;
     FewLamps lamps;
-    /// Comparable between candidates: without their weights.
-    double cost() const {
-        FewLamps plain = lamps;
-        const double residual = fit.relative_residual(lamps);
-        plain.misfit = residual * residual;
-        return fit.cost(plain);
-    }
+    double cost = 0;  ///< comparable between candidates: without their weights
 };
 
+double cost_without_weights(const Fit& fit, FewLamps lamps) {
+    lamps.misfit = std::pow(fit.relative_residual(lamps), 2);
+    return fit.cost(lamps);
+}
+
 void polish(Candidate& candidate, const FewLampsOptions& options) {
-    auto& [fit, lamps] = candidate;
+    Fit& fit = candidate.fit;
+    FewLamps& lamps = candidate.lamps;
     if (options.first_step_deg > 0) fit.move(lamps, options.first_step_deg);
     settle(fit, lamps);
     drop_needless(fit, lamps);
@@ -353,15 +353,16 @@ FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const 
                        const FewLampsOptions& options) {
     VITRINE_CHECK(!starts.empty());
     std::vector<Candidate> candidates(
-        starts.size(), {Fit(object, exitance, ground_colour, votes, options), FewLamps()});
+        starts.size(), {Fit(object, exitance, ground_colour, votes, options), FewLamps(), 0});
     parallel_for(starts.size(), 1, [&](std::size_t k) {
-        auto& [fit, lamps] = candidates[k];
+        auto& [fit, lamps, cost] = candidates[k];
         lamps = fit.fit_kernels(starts[k].directions, starts[k].seen_at);
         settle(fit, lamps);
+        cost = cost_without_weights(fit, lamps);
     });
-    Candidate& best = *std::min_element(
-        candidates.begin(), candidates.end(),
-        [](const Candidate& a, const Candidate& b) { return a.cost() < b.cost(); });
+    Candidate& best =
+        *std::min_element(candidates.begin(), candidates.end(),
+                          [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
     polish(best, options);
     return best.lamps;
 }

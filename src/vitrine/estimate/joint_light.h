@@ -1,4 +1,5 @@
-// estimate/joint_light.h: light and Ward lobes together: highlights say where a lamp stands.
+// estimate/joint_light.h: light, Ward lobes and indices together: highlights and caustics say where
+// a lamp stands.
 #pragma once
 
 #include "estimate/materials.h"
@@ -36,7 +37,11 @@ struct JointReport {
 /// each enters as N/2 ln(cost): the likelihood with its own scale eliminated, N the number of its
 /// independent patches (8 cm on the scan, 1 cm on a metal). Strength and ambient are fitted again.
 ///
-/// Returns `light` unchanged when no candidate is specular. Costs about 4 s on two cores.
+/// With likelihoods, clear solids take part as well: their caustics move the lamps, and their
+/// indices in `objects` with them.
+///
+/// Returns `light` unchanged when no candidate is specular or such a solid. Costs about 4 s on two
+/// cores.
 LightEstimate refine_light_jointly(const Scene& scene, std::span<const RgbdFrame> frames,
                                    double saturation_level, const LightEstimate& light,
                                    const LightOptions& light_options,

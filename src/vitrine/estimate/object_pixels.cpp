@@ -56,8 +56,8 @@ Silhouette silhouette_of(const EstimationScene& scene, const Camera& camera, int
 }
 
 /// A square of side one pixel over a normal that turns by `du` and `dv` from pixel to pixel.
-// Twice the lesser of the two principal variances: where a ring turns sharply one way, its
-// highlight is told by the other, and the lobe fitted is no wider than that makes it.
+/// Twice the lesser of the two principal variances: where a ring turns sharply one way, its
+/// highlight is told by the other, and the lobe fitted is no wider than that makes it.
 float variance_within(const Vec3f& du, const Vec3f& dv) {
     const float uu = du.squaredNorm(), vv = dv.squaredNorm(), uv = du.dot(dv);
     const float least = 0.5f * (uu + vv) - std::sqrt(0.25f * (uu - vv) * (uu - vv) + uv * uv);

@@ -138,12 +138,11 @@ std::vector<LampVote> votes_of(std::span<const HighlightLight> highlight_lights)
     std::vector<LampVote> votes;
     double heaviest = 1e-12;
     for (const HighlightLight& light : highlight_lights) {
-        // At the outline the normal is known best, whatever a pixel more or less does.
-        const double weight =
-            luminance(light.intensity) / std::max(0.5 * (1 + light.direction.z()), 0.05);
-        heaviest = std::max(heaviest, weight);
-        // The outline gives the normal; what lies within is guessed the worse the more it faces us.
         const double normal_z2 = 0.5 * (1 + light.direction.z());
+        // The votes of HighlightLight weigh less toward the outline, where on a body the normal is
+        // known best; what lies within is guessed the worse the more it faces us.
+        const double weight = luminance(light.intensity) / std::max(normal_z2, 0.05);
+        heaviest = std::max(heaviest, weight);
         const double spread = std::max(kSurestVote, 2 * kNormalError * std::sqrt(normal_z2));
         votes.push_back({light.direction, weight, 1 / (spread * spread)});
     }
