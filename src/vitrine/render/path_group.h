@@ -27,7 +27,7 @@ class PathGroup {
         for (std::size_t t = 0; t < lists_.size(); ++t) {
             List& list = lists_[t];
             list.pairs.resize(list.tasks.size());
-            tracers_[t].trace_both(origin_, list.tasks, list.pairs);
+            tracers_[t].trace_both(origin_, list.tasks, list.pairs, workspace_);
         }
         for (const Entry& entry : entries_) {
             const List& list = lists_[entry.tracer];
@@ -51,6 +51,7 @@ class PathGroup {
     Vec3f origin_;
     std::vector<Entry> entries_;
     std::vector<List> lists_;
+    PathTracer::Workspace workspace_;
     Use use_;
 };
 

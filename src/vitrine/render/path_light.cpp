@@ -2,6 +2,8 @@
 #include "optics/fresnel.h"
 #include "render/path_state.h"
 
+#include <numeric>
+
 namespace vitrine {
 namespace {
 
@@ -64,6 +66,26 @@ void PathTracer::add_shadows(Wave& wave) const {
     wave.shadow_rays.clear();
 }
 
+std::size_t PathTracer::pick_light(const State& state, const PathSampler& sampler) const {
+    const std::size_t count = scene_.lights().count();
+    const float u = sampler.number(state.depth, kPickUse);
+    return std::min(count - 1, static_cast<std::size_t>(u * static_cast<float>(count)));
+}
+
+void PathTracer::Wave::sort_shadows(std::size_t first, int lane_count) {
+    std::vector<std::size_t> place(static_cast<std::size_t>(lane_count) + 1, 0);
+    for (const int i : shadow_lanes) ++place[static_cast<std::size_t>(i) + 1];
+    std::partial_sum(place.begin(), place.end(), place.begin());
+    const auto at = static_cast<std::ptrdiff_t>(first);
+    const std::vector<ShadowRay> old(shadows.begin() + at, shadows.end());
+    const std::vector<Ray> old_rays(shadow_rays.begin() + at, shadow_rays.end());
+    for (std::size_t k = 0; k < old.size(); ++k) {
+        const std::size_t to = first + place[static_cast<std::size_t>(shadow_lanes[k])]++;
+        shadows[to] = old[k];
+        shadow_rays[to] = old_rays[k];
+    }
+}
+
 void PathTracer::add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                             const Frame& frame, const Vec3f& wo, int light_samples,
                             Wave& wave) const {
@@ -75,15 +97,13 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
     std::size_t begin = 0, end = lights.count();
     float boost = 1.0f;
     if (!takes_all) {
-        const float u = sampler.number(state.depth, kPickUse);
-        begin = std::min(lights.count() - 1,
-                         static_cast<std::size_t>(u * static_cast<float>(lights.count())));
+        begin = pick_light(state, sampler);
         end = begin + 1;
         boost = static_cast<float>(lights.count());
     }
     const Vec3f origin = scene_.leave_smooth(point);
     for (std::size_t i = begin; i < end; ++i) {
-        const int use = kLightUse + static_cast<int>(takes_all ? std::min<std::size_t>(i, 8) : 0);
+        const auto use = static_cast<int>(light_use(takes_all ? i : 0));
         const int count = lights.needs_position(i) ? light_samples : 1;
         const float scale = boost / static_cast<float>(count);
         for (int k = 0; k < count; ++k) {

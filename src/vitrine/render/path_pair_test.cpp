@@ -75,17 +75,21 @@ TEST(PathPair, TogetherAsOneByOne) {
     Scene whole = world();
     whole.parts.push_back(make_part(make_box(Vec3(0.05, 0.05, 0.05), Vec3(0.06, -0.08, 0.0255)),
                                     Dielectric{1.4, Rgb::Constant(5)}, true));
+    whole.lights.push_back(
+        SpotLight{Vec3(-0.3, 0.1, 0.5), Vec3(0.5, -0.2, -0.8).normalized(), Rgb::Constant(2), 40});
+    whole.lights.push_back(PointLight{Vec3(0.1, -0.3, 0.4), Rgb(0.1f, 0.2f, 0.3f)});
     const RenderScene scene(whole);
     const PathTracer tracer(scene, nullptr);
     const Vec3f eye(0.1f, -0.45f, 0.3f);
     std::vector<PathTask> tasks;
     for (int k = 0; k < 400; ++k) {
         const Vec3f place(-0.2f + 0.001f * static_cast<float>(k), 0.01f * float(k % 7), 0.05f);
-        tasks.push_back(
-            {{PathSampler(stream_key(9, unsigned(k)), 3), (place - eye).normalized()}, {}});
+        tasks.push_back({{PathSampler(stream_key(9, unsigned(k)), 3), (place - eye).normalized()},
+                         {k % 5 > 0, 1 + k % 3}});
     }
     std::vector<PathPair> together(tasks.size());
-    tracer.trace_both(eye, tasks, together);
+    PathTracer::Workspace workspace;
+    tracer.trace_both(eye, tasks, together, workspace);
     for (std::size_t i = 0; i < tasks.size(); ++i) {
         const PathPair alone = tracer.trace_both(eye, tasks[i]);
         EXPECT_TRUE(same(together[i].with(), alone.with()));

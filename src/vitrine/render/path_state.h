@@ -3,6 +3,7 @@
 #pragma once
 
 #include "render/path_tracer.h"
+#include "render/plain_lanes.h"
 
 #include <vector>
 
@@ -16,6 +17,10 @@ constexpr int kPickUse = 4;
 constexpr int kRouletteUse = 5;
 constexpr int kLightUse = 6;  // and one more per light, eight at most
 constexpr int kSecondaryUse = 15;
+
+inline std::uint32_t light_use(std::size_t light) {
+    return kLightUse + static_cast<std::uint32_t>(std::min<std::size_t>(light, 8));
+}
 
 struct PathTracer::State {
     std::uint32_t path = 0;  // whose task and result
@@ -83,9 +88,16 @@ struct PathTracer::ShadowRay {
     bool is_soft;
 };
 
+/// A path that met a plain diffuse surface.
+struct PathTracer::PlainHit {
+    State* state;
+    const Hit* hit;
+};
+
 /// Paths that go on side by side, one surface at a time: rays are sent one after the other, with
 /// nothing in between that drives Embree's data out of the nearest caches.
 struct PathTracer::Wave {
+    Wave() = default;
     Wave(std::span<const PathTask> its_tasks, std::span<PathPair> its_results)
         : tasks(its_tasks), results(its_results) {}
 
@@ -94,14 +106,22 @@ struct PathTracer::Wave {
     std::vector<State> states, next;
     std::vector<Ray> rays;
     std::vector<Hit> hits;
+    // Met in the scene without virtual parts alone, by paths that were those of both.
+    std::vector<State> parted;
+    std::vector<Hit> parted_hits;
+    std::vector<PlainHit> plain;  // of `states` and `parted`, in the order in which they came
+    PlainLanes lanes = {};
     std::vector<ShadowRay> shadows;
     std::vector<Ray> shadow_rays;  // of `shadows`
     std::vector<std::uint8_t> hidden;
+    std::vector<int> shadow_lanes;  // of the last shadow rays
 
     const PathTask& task(const State& state) const { return tasks[state.path]; }
     Sink sink(const State& state) const { return {results[state.path]}; }
     void add_shadow(const State& state, std::uint32_t views, Layer layer, const Rgb& light,
                     Ray ray);
+    /// Puts the shadow rays from `first` on, of `shadow_lanes`, in the order of their lanes.
+    void sort_shadows(std::size_t first, int lane_count);
 };
 
 /// What rays of a path meet that belongs to the scenes `views`, see PathTracer::entering.

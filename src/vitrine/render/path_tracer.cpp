@@ -24,7 +24,8 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
       caustics_(caustics),
       options_(options),
       translucent_(translucent),
-      has_virtual_(scene.has_virtual()) {}
+      has_virtual_(scene.has_virtual()),
+      lane_lights_(lane_lights(scene.lights())) {}
 
 PathResult PathTracer::trace(const Vec3f& origin, const PathTask& task) const {
     PathPair pair;
@@ -35,13 +36,19 @@ PathResult PathTracer::trace(const Vec3f& origin, const PathTask& task) const {
 
 PathPair PathTracer::trace_both(const Vec3f& origin, const PathTask& task) const {
     PathPair pair;
-    trace_both(origin, std::span(&task, 1), std::span(&pair, 1));
+    Workspace workspace;
+    trace_both(origin, std::span(&task, 1), std::span(&pair, 1), workspace);
     return pair;
 }
 
+PathTracer::Workspace::Workspace() : wave_(std::make_unique<Wave>()) {}
+PathTracer::Workspace::~Workspace() = default;
+
 void PathTracer::trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
-                            std::span<PathPair> results) const {
-    Wave wave(tasks, results);
+                            std::span<PathPair> results, Workspace& workspace) const {
+    Wave& wave = *workspace.wave_;
+    wave.tasks = tasks;
+    wave.results = results;
     start(origin, has_virtual_ ? kAllParts : kVirtualParts, wave);
 }
 
@@ -49,14 +56,13 @@ void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) con
     State first;
     first.origin = origin;
     first.views = views;
-    wave.states.reserve(wave.tasks.size());
-    wave.rays.reserve(wave.tasks.size());
+    const Ray ray{origin, Vec3f::Zero(), 0.0f, 1e30f, mask_of(views)};
+    wave.states.assign(wave.tasks.size(), first);
+    wave.rays.assign(wave.tasks.size(), ray);
     for (std::size_t i = 0; i < wave.tasks.size(); ++i) {
         wave.results[i].clear();
-        first.path = static_cast<std::uint32_t>(i);
-        first.direction = wave.tasks[i].sample.direction;
-        wave.states.push_back(first);
-        wave.rays.push_back({origin, first.direction, 0.0f, 1e30f, mask_of(views)});
+        wave.states[i].path = static_cast<std::uint32_t>(i);
+        wave.states[i].direction = wave.rays[i].direction = wave.tasks[i].sample.direction;
     }
     // Neighbours' camera rays run side by side, which Embree's packets are made for.
     wave.hits.resize(wave.rays.size());
@@ -75,15 +81,22 @@ void PathTracer::finish(Wave& wave) const {
             const Hit& hit = wave.hits[i];
             if (state.views == kAllParts && hit.is_hit() && scene_.is_virtual(hit.part)) {
                 wave.sink(state).part();
-                State real = state;
+                if (wave.parted.empty()) {  // hits of plain surfaces point into both
+                    wave.parted.reserve(count);
+                    wave.parted_hits.reserve(count);
+                }
+                State& real = wave.parted.emplace_back(state);
                 real.views = kRealParts;
                 state.views = kVirtualParts;
                 step(state, hit, wave);
-                step(real, closest(real), wave);
+                step(real, wave.parted_hits.emplace_back(closest(real)), wave);
             } else {
                 step(state, hit, wave);
             }
         }
+        shade_plain(wave);
+        wave.parted.clear();
+        wave.parted_hits.clear();
         add_shadows(wave);
         wave.states.swap(wave.next);
         find_hits(wave);
@@ -128,8 +141,11 @@ void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const 
 
 void PathTracer::step(State& state, const Hit& hit, Wave& wave) const {
     Sink sink = wave.sink(state);
-    state.throughput *= scene_.transmittance(state.media, hit.is_hit() ? hit.distance : 1e30f);
-    add_emission(state, hit.is_hit() ? hit.distance : 1e30f, sink);
+    const float distance = hit.is_hit() ? hit.distance : 1e30f;
+    if (state.media.current() != Media::kNone) {
+        state.throughput *= scene_.transmittance(state.media, distance);
+    }
+    add_emission(state, distance, sink);
     if (!hit.is_hit()) {
         add_environment(state, sink);
         return;
@@ -142,8 +158,12 @@ void PathTracer::step(State& state, const Hit& hit, Wave& wave) const {
             if (result.soft.hit_distance == 0) result.soft.hit_distance = hit.distance;
         });
     }
-    const ShadingPoint point = scene_.surface(hit, state.direction);
     ++state.depth;
+    if (scene_.shape(hit.part).is_diffuse) {
+        wave.plain.push_back({&state, &hit});
+        return;
+    }
+    const ShadingPoint point = scene_.surface(hit, state.direction);
     if (scene_.dielectric(hit.part)) {
         if (++state.specular_bounces > options_.max_specular_bounces) return;
         pass_interface(state, point, wave);
@@ -180,17 +200,6 @@ void PathTracer::step(State& state, const Hit& hit, Wave& wave) const {
     if (options_.direct_light_only || state.diffuse_bounces >= options_.max_diffuse_bounces) {
         return;
     }
-    const auto* plain = std::get_if<DiffuseBsdf>(&bsdf);
-    if (plain && !state.has_receiver && !state.is_layer_fixed) {
-        sink.each(state.views, [&](PathResult& result) {
-            result.soft.is_present = true;
-            result.soft.albedo = plain->albedo;
-            result.soft.position = point.position;
-            result.soft.normal = point.shading_normal;
-        });
-        if (!wish.finds_soft) return;
-        state.is_soft = true;
-    }
     add_secondary(state, point, bsdf, wave);
     if (scatter(state, point, bsdf, frame, wo, sampler)) wave.next.push_back(state);
 }
@@ -204,6 +213,11 @@ bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bs
     const Vec3f direction = frame.to_world(s.wi);
     if (direction.dot(point.geometric_normal) <= 0) return false;
     state.throughput *= s.weight;
+    return send_on(state, s, direction, scene_.leave_smooth(point), sampler);
+}
+
+bool PathTracer::send_on(State& state, const BsdfSample& s, const Vec3f& direction,
+                         const Vec3f& origin, const PathSampler& sampler) const {
     const bool was_seen = !state.has_receiver;
     if (s.lobe == Lobe::Glossy && was_seen && !state.is_layer_fixed) {
         state.layer = Layer::Reflection;
@@ -218,8 +232,7 @@ bool PathTracer::scatter(State& state, const ShadingPoint& point, const Bsdf& bs
     state.has_receiver = true;
     state.is_first_receiver = false;
     state.direction = direction;
-    state.origin = scene_.leave_smooth(point);
-    state.receiver = state.origin;
+    state.origin = state.receiver = origin;
     ++state.diffuse_bounces;
     if (state.diffuse_bounces > 1) {
         const float survival = std::min(1.0f, state.throughput.maxCoeff());

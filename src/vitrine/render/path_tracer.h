@@ -7,6 +7,7 @@
 #pragma once
 
 #include "render/caustic_maps.h"
+#include "render/plain_lanes.h"
 #include "render/render_scene.h"
 #include "render/sampler.h"
 #include "render/translucent_light.h"
@@ -113,6 +114,9 @@ struct PathTask {
     PathWish wish;
 };
 
+/// The lights that `sample_light` knows: discs and points.
+std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights);
+
 class PathTracer {
   public:
     /// @param caustics may be null: the reference; kept by reference, as is the scene
@@ -126,9 +130,11 @@ class PathTracer {
     /// In the scene with its virtual parts and in the one without. What both have in common is
     /// traced once: they part where a ray meets a virtual part, and go on with the same numbers.
     PathPair trace_both(const Vec3f& origin, const PathTask& task) const;
-    /// Of many paths: a few hundred together cost about two thirds of what they cost one by one.
+    /// Memory of paths under way, which serves many calls; one per thread.
+    class Workspace;
+    /// Of many paths: a few hundred together cost about half of what they cost one by one.
     void trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
-                    std::span<PathPair> results) const;
+                    std::span<PathPair> results, Workspace& workspace) const;
 
     /// Irradiance / pi that enters a translucent body at `point` along each of some paths. Photons
     /// that land on it are left out: they are known one by one.
@@ -143,6 +149,7 @@ class PathTracer {
     struct Sink;
     struct ShadowRay;
     struct Wave;
+    struct PlainHit;
     void start(const Vec3f& origin, std::uint32_t views, Wave& wave) const;
     /// Follows all paths of the wave to their ends.
     void finish(Wave& wave) const;
@@ -150,6 +157,12 @@ class PathTracer {
     void find_hits(Wave& wave) const;
     /// What `hit` of the state's ray brings; what goes on from there is added to the wave's next.
     void step(State& state, const Hit& hit, Wave& wave) const;
+    /// What the wave's hits of plain diffuse surfaces bring, many side by side.
+    void shade_plain(Wave& wave) const;
+    void shade_plain(Wave& wave, std::span<const PlainHit> hits) const;
+    void add_direct(Wave& wave, std::span<const PlainHit> hits) const;
+    void scatter(Wave& wave, std::span<const PlainHit> hits,
+                 const Lane<std::uint32_t>& is_open) const;
     void add_emission(const State& state, float distance, Sink sink) const;
     void add_environment(const State& state, Sink sink) const;
     void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
@@ -165,8 +178,13 @@ class PathTracer {
                        Wave& wave) const;
     /// Light of the wave's shadow rays that arrives.
     void add_shadows(Wave& wave) const;
+    std::size_t pick_light(const State& state, const PathSampler& sampler) const;
     bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
                  const Vec3f& wo, const PathSampler& sampler) const;
+    /// Sends the path on from a receiver, unless chance ends it.
+    /// @param direction of `s.wi` in the world
+    bool send_on(State& state, const BsdfSample& s, const Vec3f& direction, const Vec3f& origin,
+                 const PathSampler& sampler) const;
     void pass_interface(const State& state, const ShadingPoint& point, Wave& wave) const;
 
     const RenderScene& scene_;
@@ -174,6 +192,17 @@ class PathTracer {
     PathOptions options_;
     const TranslucentLight* translucent_;
     bool has_virtual_;
+    std::vector<std::optional<LaneLight>> lane_lights_;  // discs and points
+};
+
+class PathTracer::Workspace {
+  public:
+    Workspace();
+    ~Workspace();
+
+  private:
+    friend class PathTracer;
+    std::unique_ptr<Wave> wave_;
 };
 
 }  // namespace vitrine

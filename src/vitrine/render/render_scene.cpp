@@ -127,7 +127,16 @@ void RenderScene::measure_parts() {
     }
     for (std::size_t p = bodies_.size(); p < scene_.parts.size(); ++p) {
         const Part& part = scene_.parts[p];
-        volumes_m3_.push_back(std::abs(volume(*part.mesh)));
+        const Mesh& mesh = *part.mesh;
+        volumes_m3_.push_back(std::abs(volume(mesh)));
+        const auto* diffuse = std::get_if<Diffuse>(&part.material);
+        const bool is_textured = diffuse && diffuse->albedo_texture && !mesh.uv.empty();
+        const bool is_painted = diffuse && diffuse->use_vertex_colours && !mesh.colours.empty();
+        shapes_.push_back({mesh.triangles.data(), mesh.vertices.data(),
+                           mesh.normals.empty() ? nullptr : mesh.normals.data(),
+                           mesh.colours.empty() ? nullptr : mesh.colours.data(), diffuse != nullptr,
+                           !is_textured && !is_painted,
+                           diffuse ? diffuse->albedo : Rgb(Rgb::Zero())});
         const auto* translucent = std::get_if<Translucent>(&part.material);
         const bool is_body = translucent && !part.mesh->empty();
         bodies_.push_back(is_body ? std::make_shared<TranslucentBody>(part.mesh, *translucent)
@@ -188,13 +197,12 @@ Rgb RenderScene::transmittance(const Media& media, float distance) const {
 
 void RenderScene::prefetch_vertices(const Hit& hit) const {
     if (!hit.is_hit()) return;
-    const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
-    const Triangle& t = mesh.triangles[static_cast<std::size_t>(hit.triangle)];
+    const PartShape& s = shape(hit.part);
+    const Triangle& t = s.triangles[hit.triangle];
     for (int k = 0; k < 3; ++k) {
-        const auto v = static_cast<std::size_t>(t[k]);
-        __builtin_prefetch(&mesh.vertices[v]);
-        if (!mesh.normals.empty()) __builtin_prefetch(&mesh.normals[v]);
-        if (!mesh.colours.empty()) __builtin_prefetch(&mesh.colours[v]);
+        __builtin_prefetch(s.vertices + t[k]);
+        if (s.normals) __builtin_prefetch(s.normals + t[k]);
+        if (s.colours) __builtin_prefetch(s.colours + t[k]);
     }
 }
 

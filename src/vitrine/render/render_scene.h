@@ -46,6 +46,17 @@ struct ShadingPoint {
     bool is_front = true;                    ///< the ray came from outside the mesh
 };
 
+/// What is read of a part at every hit, in one place.
+struct PartShape {
+    const Triangle* triangles;
+    const Vec3f* vertices;
+    const Vec3f* normals;  ///< null: flat
+    const Rgb* colours;    ///< null: none
+    bool is_diffuse;       ///< a plain diffuse surface, of `Material` Diffuse
+    bool has_one_albedo;   ///< of these: `albedo` everywhere
+    Rgb albedo;
+};
+
 class RenderScene {
   public:
     RenderScene() = default;
@@ -95,6 +106,7 @@ class RenderScene {
     const Material& material(int part) const {
         return scene_.parts[static_cast<std::size_t>(part)].material;
     }
+    const PartShape& shape(int part) const { return shapes_[static_cast<std::size_t>(part)]; }
     bool is_virtual(int part) const {
         return scene_.parts[static_cast<std::size_t>(part)].is_virtual;
     }
@@ -118,8 +130,7 @@ class RenderScene {
     /// for.
     void prefetch_triangle(const Hit& hit) const {
         if (!hit.is_hit()) return;
-        const Mesh& mesh = *scene_.parts[static_cast<std::size_t>(hit.part)].mesh;
-        __builtin_prefetch(&mesh.triangles[static_cast<std::size_t>(hit.triangle)]);
+        __builtin_prefetch(shape(hit.part).triangles + hit.triangle);
     }
     void prefetch_vertices(const Hit& hit) const;
     /// The surface that `hit` of a ray found.
@@ -151,6 +162,7 @@ class RenderScene {
     Sphere bounding_sphere_;
     std::vector<double> volumes_m3_;
     std::vector<int> medium_rank_;
+    std::vector<PartShape> shapes_;
     std::vector<std::shared_ptr<const TranslucentBody>> bodies_;  // per part
     float epsilon_ = 1e-6f;
 };

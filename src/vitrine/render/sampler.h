@@ -25,9 +25,7 @@ class PathSampler {
     Vec2f pair(int depth, int purpose) const {
         const std::uint64_t key = key_of(depth, purpose);
         if (depth <= kStratifiedDepth) return sobol_pair(index_, static_cast<std::uint32_t>(key));
-        const std::uint64_t bits = bits_of(key);
-        return {static_cast<float>(bits >> 40) * 0x1p-24f,
-                static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
+        return unstratified(key, index_);
     }
     /// Two more dimensions of the same points, stratified together with `pair`: for quantities that
     /// only act together, such as the place on a lamp and the direction from there. First vertex.
@@ -48,19 +46,29 @@ class PathSampler {
         if (depth <= kStratifiedDepth) {
             return scrambled_sobol(index_, 0, static_cast<std::uint32_t>(key));
         }
-        return static_cast<float>(bits_of(key) >> 40) * 0x1p-24f;
+        return static_cast<float>(bits_of(key, index_) >> 40) * 0x1p-24f;
+    }
+
+    // For loops over the samples of many paths, which do what `pair` does; see plain_lanes.h.
+    std::uint64_t mixed_stream() const { return mixed_stream_; }
+    std::uint32_t index() const { return index_; }
+    /// Beyond the second diffuse bounce stratification buys nothing measurable.
+    static constexpr int kStratifiedDepth = 3;
+    /// Of the key of a use.
+    static Vec2f unstratified(std::uint64_t key, std::uint32_t index) {
+        const std::uint64_t bits = bits_of(key, index);
+        return {static_cast<float>(bits >> 40) * 0x1p-24f,
+                static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
     }
 
   private:
-    // Beyond the second diffuse bounce stratification buys nothing measurable.
-    static constexpr int kStratifiedDepth = 3;
     std::uint64_t key_of(int depth,
                          int purpose) const {  // = stream_key(stream, 16 depth + purpose)
         return mix_bits(mixed_stream_ ^
                         (static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose)));
     }
-    std::uint64_t bits_of(std::uint64_t key) const {
-        return mix_bits(key ^ (std::uint64_t{index_} << 32 | index_));
+    static std::uint64_t bits_of(std::uint64_t key, std::uint32_t index) {
+        return mix_bits(key ^ (std::uint64_t{index} << 32 | index));
     }
 
     std::uint64_t mixed_stream_;

@@ -1,0 +1,187 @@
+// What paths find at plain diffuse surfaces: the same as `PathTracer::step` at others, for many
+// side by side.
+#include "render/path_state.h"
+
+namespace vitrine {
+namespace {
+
+template <typename T>
+std::size_t lane(T i) {
+    return static_cast<std::size_t>(i);
+}
+
+/// As the other `sample_light`, of lights of any kind.
+void sample_light(PlainLanes& lanes, const LightSampler& lights, std::size_t light, int count) {
+    for (int i = 0; i < count; ++i) {
+        const auto s = lights.sample(light, lanes.origin.at(i), {lanes.u[lane(i)], lanes.v[lane(i)]});
+        lanes.lit[lane(i)] = s ? 1.0f : 0.0f;
+        if (!s) continue;
+        lanes.to_light.set(i, s->direction);
+        lanes.light.set(i, s->radiance_over_pdf);
+        lanes.distance[lane(i)] = s->distance;
+        lanes.pdf[lane(i)] = s->pdf;
+    }
+}
+
+}  // namespace
+
+std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
+    std::vector<std::optional<LaneLight>> result(lights.count());
+    for (std::size_t i = 0; i < lights.count(); ++i) {
+        if (const auto* disc = std::get_if<DiscLight>(&lights.light(i))) {
+            result[i] = {disc->position_m.cast<float>(), Frame(disc->normal.cast<float>()),
+                         static_cast<float>(disc->radius_m),
+                         kPif * static_cast<float>(disc->radius_m * disc->radius_m),
+                         disc->intensity_w_per_sr};
+        } else if (const auto* point = std::get_if<PointLight>(&lights.light(i))) {
+            result[i] = {point->position_m.cast<float>(), Frame(Vec3f(0, 0, 1)), 0, 0,
+                         point->intensity_w_per_sr};
+        }
+    }
+    return result;
+}
+
+void PathTracer::shade_plain(Wave& wave) const {
+    const std::span<const PlainHit> all(wave.plain);
+    for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
+        shade_plain(wave, all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
+    }
+    wave.plain.clear();
+}
+
+void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
+    PlainLanes& lanes = wave.lanes;
+    const int count = static_cast<int>(hits.size());
+    for (int i = 0; i < count; ++i) {
+        State& state = *hits[lane(i)].state;
+        const Hit& hit = *hits[lane(i)].hit;
+        const PartShape& shape = scene_.shape(hit.part);
+        const Triangle& triangle = shape.triangles[hit.triangle];
+        for (int k = 0; k < 3; ++k) {
+            lanes.corner[k].set(i, shape.vertices[triangle[k]]);
+            lanes.corner_normal[k].set(i, shape.normals ? shape.normals[triangle[k]] : hit.normal);
+        }
+        lanes.weight1[lane(i)] = hit.barycentric.x();
+        lanes.weight2[lane(i)] = hit.barycentric.y();
+        lanes.is_rounded[lane(i)] = shape.normals ? 1 : 0;
+        lanes.facet.set(i, hit.normal);
+        lanes.direction.set(i, state.direction);
+        lanes.albedo.set(i, shape.has_one_albedo ? shape.albedo
+                                                 : scene_.diffuse_albedo(hit.part, hit));
+        lanes.throughput.set(i, state.throughput);
+        const PathSampler& sampler = wave.task(state).sample.sampler;
+        lanes.random.stream[lane(i)] = sampler.mixed_stream();
+        lanes.random.index[lane(i)] = sampler.index();
+        lanes.random.depth[lane(i)] = static_cast<std::uint32_t>(state.depth);
+        lanes.can_scatter[lane(i)] = !options_.direct_light_only &&
+                                             state.diffuse_bounces < options_.max_diffuse_bounces
+                                         ? 1
+                                         : 0;
+        if (!state.is_layer_fixed) {
+            state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
+        }
+    }
+    find_surfaces(lanes, scene_.epsilon(), count);
+    add_direct(wave, hits);
+    Lane<std::uint32_t> is_open = lanes.can_scatter;
+    for (int i = 0; i < count; ++i) {
+        State& state = *hits[lane(i)].state;
+        const DiffuseBsdf bsdf{lanes.albedo.at(i).array()};
+        ShadingPoint point;
+        if (caustics_) {
+            point.part = hits[lane(i)].hit->part;
+            point.position = lanes.position.at(i);
+            point.smooth_position = lanes.smooth.at(i);
+            point.geometric_normal = lanes.geometric.at(i);
+            point.shading_normal = lanes.shading.at(i);
+            add_caustics(state, point, bsdf, Frame(point.shading_normal), Vec3f(0, 0, 1),
+                         wave.sink(state));
+        }
+        if (is_open[lane(i)] && !state.has_receiver && !state.is_layer_fixed) {
+            wave.sink(state).each(state.views, [&](PathResult& result) {
+                result.soft.is_present = true;
+                result.soft.albedo = bsdf.albedo;
+                result.soft.position = lanes.position.at(i);
+                result.soft.normal = lanes.shading.at(i);
+            });
+            state.is_soft = wave.task(state).wish.finds_soft;
+            if (!state.is_soft) is_open[lane(i)] = 0;
+        }
+        if (caustics_ && is_open[lane(i)]) add_secondary(state, point, bsdf, wave);
+    }
+    scatter(wave, hits, is_open);
+}
+
+void PathTracer::add_direct(Wave& wave, std::span<const PlainHit> hits) const {
+    const LightSampler& lights = scene_.lights();
+    PlainLanes& lanes = wave.lanes;
+    const int count = static_cast<int>(hits.size());
+    const bool has_choice = lights.count() > 1;
+    const std::size_t first_shadow = wave.shadows.size();
+    wave.shadow_lanes.clear();
+    // All lights at the surface seen; one of them, by turns of chance, at those behind it.
+    Lane<std::size_t> picked;
+    for (int i = 0; has_choice && i < count; ++i) {
+        const State& state = *hits[lane(i)].state;
+        if (!state.has_receiver) continue;
+        picked[lane(i)] = pick_light(state, wave.task(state).sample.sampler);
+    }
+    for (std::size_t light = 0; light < lights.count(); ++light) {
+        const bool has_size = lights.needs_position(light);
+        std::uint32_t most = 1;
+        for (int i = 0; i < count; ++i) {
+            const State& state = *hits[lane(i)].state;
+            const bool takes_all = !has_choice || !state.has_receiver;
+            const int wish = wave.task(state).wish.light_samples;
+            const auto of = static_cast<std::uint32_t>(has_size && !state.has_receiver ? wish : 1);
+            lanes.random.of[lane(i)] = of;
+            lanes.random.use[lane(i)] = light_use(takes_all ? light : 0);
+            lanes.scale[lane(i)] = (takes_all ? 1.0f : float(lights.count())) / float(of);
+            most = std::max(most, of);
+        }
+        for (std::uint32_t k = 0; k < most; ++k) {
+            if (has_size) random_pairs(lanes.random, k, lanes.u, lanes.v, count);
+            if (lane_lights_[light]) {
+                sample_light(lanes, *lane_lights_[light], count);
+            } else {
+                sample_light(lanes, lights, light, count);
+            }
+            receive_light(lanes, count);
+            for (int i = 0; i < count; ++i) {
+                const State& state = *hits[lane(i)].state;
+                if (!(lanes.lit[lane(i)] > 0) || k >= lanes.random.of[lane(i)]) continue;
+                if (has_choice && state.has_receiver && picked[lane(i)] != light) continue;
+                wave.add_shadow(state, state.views, state.layer, lanes.light.at(i).array(),
+                                {lanes.origin.at(i), lanes.to_light.at(i), 0.0f,
+                                 lanes.distance[lane(i)] * (1 - 1e-4f)});
+                wave.shadow_lanes.push_back(i);
+            }
+        }
+    }
+    if (wave.shadow_lanes.size() > hits.size()) wave.sort_shadows(first_shadow, count);
+}
+
+void PathTracer::scatter(Wave& wave, std::span<const PlainHit> hits,
+                         const Lane<std::uint32_t>& is_open) const {
+    PlainLanes& lanes = wave.lanes;
+    const int count = static_cast<int>(hits.size());
+    const auto end = is_open.begin() + count;
+    if (std::find(is_open.begin(), end, 1u) == end) return;
+    lanes.random.of.fill(1);
+    lanes.random.use.fill(kScatterUse);
+    random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
+    scatter_lanes(lanes, count);
+    for (int i = 0; i < count; ++i) {
+        if (!is_open[lane(i)] || !(lanes.open[lane(i)] > 0)) continue;
+        // Copied before it is written to: what was just written would have to be waited for.
+        State& state = wave.next.emplace_back(*hits[lane(i)].state);
+        state.throughput = lanes.throughput.at(i).array();
+        const BsdfSample scattered{lanes.scattered.at(i), Rgb::Ones(), lanes.scattered_pdf[lane(i)]};
+        const PathSampler& sampler = wave.task(state).sample.sampler;
+        if (!send_on(state, scattered, scattered.wi, lanes.origin.at(i), sampler)) {
+            wave.next.pop_back();
+        }
+    }
+}
+
+}  // namespace vitrine

@@ -1,0 +1,104 @@
+// render/plain_lanes.h: points of plain diffuse surfaces, many side by side: what a path does there
+// in loops over arrays, which run in vector registers. A lane's values do not depend on its
+// neighbours, and are bit by bit those of `RenderScene::surface`, `PathSampler::pair`,
+// `LightSampler::sample` and `sample(DiffuseBsdf)`.
+#pragma once
+
+#include "render/light_sampler.h"
+
+#include <array>
+#include <cstdint>
+
+namespace vitrine {
+
+constexpr int kLanes = 64;
+/// Loops run over a multiple of this.
+constexpr int kLaneStep = 16;
+
+template <typename T>
+using Lane = std::array<T, kLanes>;
+
+/// A vector or colour per lane.
+struct Lanes3 {
+    Lane<float> x, y, z;
+    Vec3f at(int i) const {
+        const auto k = static_cast<std::size_t>(i);
+        return {x[k], y[k], z[k]};
+    }
+    template <typename Vector>
+    void set(int i, const Vector& v) {
+        const auto k = static_cast<std::size_t>(i);
+        x[k] = v[0];
+        y[k] = v[1];
+        z[k] = v[2];
+    }
+};
+
+/// Random numbers of paths: of a stream at a vertex.
+struct RandomLanes {
+    Lane<std::uint64_t> stream;  ///< mixed, see PathSampler
+    Lane<std::uint32_t> index;   ///< of the sample
+    Lane<std::uint32_t> depth;   ///< of the vertex
+    Lane<std::uint32_t> use;     ///< at the vertex
+    Lane<std::uint32_t> of;      ///< pairs that the sample takes instead of one
+};
+
+struct PlainLanes {
+    // What the ray met.
+    Lanes3 corner[3], corner_normal[3];
+    Lane<float> weight1, weight2;    ///< of corners 1 and 2
+    Lane<std::uint32_t> is_rounded;  ///< has normals per vertex
+    Lanes3 facet;                    ///< geometric normal, outward
+    Lanes3 direction;                ///< of the ray
+    Lanes3 albedo;
+    // The surface; see ShadingPoint.
+    Lanes3 position, geometric, shading;
+    Lanes3 smooth;  ///< smooth_position
+    Lanes3 origin;  ///< of rays that leave: RenderScene::leave_smooth
+    // The path.
+    Lanes3 throughput;
+    RandomLanes random;
+    Lane<std::uint32_t> can_scatter;  ///< else shadow rays alone find the lamps
+    // A light's sample, then what it brings if nothing is in its way.
+    Lane<float> u, v;
+    Lanes3 to_light, light;
+    Lane<float> distance, pdf;
+    Lane<float> scale;  ///< of what the light brings
+    Lane<float> lit;  ///< above 0: may arrive
+    // The ray that goes on.
+    Lanes3 scattered;
+    Lane<float> scattered_pdf;
+    Lane<float> open;  ///< above 0: it leaves the surface and carries something
+};
+
+// All of these work on the first `count` lanes, rounded up to whole steps.
+
+/// Fills position, geometric, shading, origin from what was met.
+void find_surfaces(PlainLanes& lanes, float epsilon, int count);
+
+/// PathSampler::pair(depth, use, of, k) of each lane.
+void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<float>& u, Lane<float>& v,
+                  int count);
+
+/// A light as `light_samples` needs it; without area: a point.
+struct LaneLight {
+    Vec3f position = Vec3f::Zero();
+    Frame frame{Vec3f(0, 0, 1)};
+    float radius = 0, area = 0;
+    Rgb intensity = Rgb::Zero();
+};
+/// Fills to_light, distance, pdf, light (radiance / pdf), lit; uses u and v.
+void sample_light(PlainLanes& lanes, const LaneLight& light, int count);
+
+/// From a light's samples to what they bring: `light` times throughput, albedo, cosine, scale and
+/// weight against the scattered ray (where there is one).
+void receive_light(PlainLanes& lanes, int count);
+
+/// Fills scattered, scattered_pdf, open, and puts the albedo to the throughput; uses u and v.
+void scatter_lanes(PlainLanes& lanes, int count);
+
+/// Unit directions corner + x right + y down.
+void unit_directions(const Vec3f& corner, const Vec3f& right, const Vec3f& down,
+                     const Lane<float>& x, const Lane<float>& y, Lanes3& direction, int count);
+
+}  // namespace vitrine
