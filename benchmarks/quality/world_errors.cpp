@@ -77,6 +77,7 @@ std::string found_class_of(const SceneEstimate& estimate) {
     return class_name(object.object_class);
 }
 
+/// Errors and deviations both in shares of the truth.
 void add_light(const DiscLight& truth, const FittedLight& fitted, const Vec3& reference,
                bool is_sunny, int rank, std::vector<QuantityError>& out) {
     const std::string name = rank == 0 ? "" : "second_";
@@ -93,13 +94,13 @@ void add_light(const DiscLight& truth, const FittedLight& fitted, const Vec3& re
     const double intensity = luminance(truth.intensity_w_per_sr);
     const std::string weak = fitted.is_distant ? "not_identifiable" : outcome;
     out.push_back({name + "distance_percent", 100.0 * (found.norm() / distance - 1.0),
-                   100.0 * fitted.stddev_distance_m / found.norm(), weak});
-    out.push_back({name + "intensity_percent",
-                   100.0 * (luminance(fitted.light.intensity_w_per_sr) / intensity - 1.0),
-                   100.0 * fitted.stddev_intensity_ratio, weak});
+                   100.0 * fitted.stddev_distance_m / distance, weak});
+    const double intensity_ratio = luminance(fitted.light.intensity_w_per_sr) / intensity;
+    out.push_back({name + "intensity_percent", 100.0 * (intensity_ratio - 1.0),
+                   100.0 * fitted.stddev_intensity_ratio * intensity_ratio, weak});
     out.push_back({name + "disc_radius_percent",
                    100.0 * (fitted.light.radius_m / truth.radius_m - 1.0),
-                   100.0 * fitted.stddev_radius_m / fitted.light.radius_m, weak});
+                   100.0 * fitted.stddev_radius_m / truth.radius_m, weak});
 }
 
 /// The fitted lobe over the true one, summed over the pixels that see the object under the first
@@ -152,8 +153,10 @@ void add_object(const WorldOptions& options, const World& world, const ObjectEst
         for (int c = 0; c < 3; ++c)
             out.push_back(
                 {"rho_d", fit.ward.rho_d[c] - ward->rho_d[c], fit.stddev_rho_d[c], outcome});
-        out.push_back({"lobe_percent", 100.0 * (lobe_ratio(world, fit.ward, *ward) - 1.0),
-                       100.0 * luminance(fit.stddev_rho_s) / luminance(fit.ward.rho_s), outcome});
+        const double lobe = lobe_ratio(world, fit.ward, *ward);
+        out.push_back({"lobe_percent", 100.0 * (lobe - 1.0),
+                       100.0 * lobe * luminance(fit.stddev_rho_s) / luminance(fit.ward.rho_s),
+                       outcome});
     }
 }
 

@@ -17,16 +17,15 @@ Rgb with_share(const Rgb& stddev, const Rgb& value, double constant, double rati
 }  // namespace
 
 void add_model_error(TransparentFit& solid, const TransparentOptions& options,
-                     const Rgb& absorption_per_ior) {
-    const double ior = options.known_ior ? 0.0 : kModelIorPerCost * solid.cost;
+                     const SolidDoubt& doubt) {
+    const double ior = options.known_ior ? 0.0 : std::hypot(kModelIor, doubt.ior_half_width);
     solid.ior.stddev = std::hypot(solid.ior.stddev, ior);
-    if (!options.known_sigma_a) {
-        solid.sigma_a_per_m.stddev =
-            with_share(solid.sigma_a_per_m.stddev, absorption_per_ior.abs(), 0.0, ior);
-        solid.sigma_a_per_m.stddev =
-            with_share(solid.sigma_a_per_m.stddev, solid.sigma_a_per_m.value, kModelAbsorption,
-                       kModelAbsorptionRatio);
-    }
+    if (options.known_sigma_a) return;
+    Rgb& stddev = solid.sigma_a_per_m.stddev;
+    stddev = with_share(stddev, doubt.absorption_per_ior.abs(), 0.0, ior);
+    stddev = with_share(stddev, solid.sigma_a_per_m.value, kModelAbsorption, kModelAbsorptionRatio);
+    const double common = kCommonResidual * solid.cost / std::max(doubt.length_m, kMinSolidLength);
+    stddev = with_share(stddev, Rgb::Zero(), common, 0.0);
 }
 
 void add_model_error(WardFit& fit, double light_stddev) {

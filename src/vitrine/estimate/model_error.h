@@ -27,12 +27,17 @@ constexpr LampError kWeakerLamp = {0.012, 0.03, 0.06};
 // Penumbrae are about as narrow as what a pixel sees of the table.
 constexpr double kModelLogRadius = 0.2;
 
-// Index: grows with the residual, which is large where the hull is off.
-constexpr double kModelIorPerCost = 0.25;
+// Index: what a hull is off by changes the residual of every index by about this share, and so all
+// indices with a cost within it are alike; and no index is known better than the constant.
+constexpr double kAlikeCost = 1.04;
+constexpr double kModelIor = 0.004;
 // Normals of a hull's lit half shift the index that its caustic asks for by 0.04 to 0.1.
 constexpr double kCausticIor = 0.06;
-constexpr double kModelAbsorption = 0.05;  // per metre
-constexpr double kModelAbsorptionRatio = 0.015;
+// Absorption: a share of the residual may be the same in all pixels, and then it is read as
+// absorption along the way through the glass, whose length the hull also knows within a share.
+constexpr double kModelAbsorption = 0.03;  // per metre
+constexpr double kModelAbsorptionRatio = 0.005;
+constexpr double kCommonResidual = 0.2;
 
 // Ward: relative. A hull's normals are off by this much, which widens or narrows a lobe by the
 // square over its own, and move light between lobe and diffuse.
@@ -42,11 +47,14 @@ constexpr double kModelRhoDPerRhoS = 0.01;  // what the lobe mirrors is not know
 constexpr double kModelLogRhoD = 0.02;
 constexpr double kModelLogRhoS = 0.065;
 
-/// @param absorption_per_ior how the absorption fitted changes with the index: what the index is
-/// off
-///   by goes on into it
+/// What a fit of solid glass tells of its own model error.
+struct SolidDoubt {
+    double ior_half_width = 0.0;  ///< of the indices with a cost within `kAlikeCost` of the least
+    Rgb absorption_per_ior = Rgb::Zero();  ///< what the index is off by goes on into it
+    double length_m = 0.0;                 ///< of the median way through the glass
+};
 void add_model_error(TransparentFit& solid, const TransparentOptions& options,
-                     const Rgb& absorption_per_ior);
+                     const SolidDoubt& doubt);
 /// @param light_stddev of the irradiance, relative: what is measured is its product with a
 ///   reflectance
 void add_model_error(WardFit& fit, double light_stddev);

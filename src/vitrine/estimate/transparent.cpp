@@ -1,13 +1,11 @@
 #include "estimate/transparent.h"
 
-#include "base/parallel.h"
+#include "base/log.h"
 #include "base/rng.h"
+#include "estimate/beyond_scan.h"
 #include "estimate/model_error.h"
-#include "estimate/vessel.h"
 #include "math/optimise.h"
 #include "math/statistics.h"
-#include "optics/fresnel.h"
-#include "render/estimation_refraction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,90 +18,48 @@ constexpr double kCap = 0.25;  // of the bright level: beyond, a pixel is simply
 constexpr int kIorGrid = 21;   // step 0.04: no basin of the objective is narrower
 constexpr int kBootstrapRounds = 40;
 constexpr double kMinExplained = 0.15;
-constexpr int kRays = 2;  // side of the square of rays in a pixel
-
-Rgb environment(const EstimationScene& scene, const Vec3f& origin, const Vec3f& direction,
-                const Rgb& ambient) {
-    const Hit hit = scene.accel().closest({origin, direction, 1e-4f, 1e30f, kScanMask});
-    const std::optional<Rgb> seen = scene.scan_radiance(hit, direction);
-    return seen ? *seen : ambient;
-}
-
-/// One ray of a pixel.
-template <typename Trace, typename TraceInner>
-ThroughPixel predict_ray(const EstimationScene& scene, const FrameLookup& lookup, const Vec3f& eye,
-                         const Vec3f& direction, const Rgb& ambient, const Trace& trace,
-                         const TraceInner& trace_inner) {
-    ThroughPixel result;
-    const RefractedPath path = trace(eye, direction);
-    if (!path.is_valid) return result;
-    const Hit hit = scan_behind(scene, path, scene.offset_m());
-    Rgb background = ambient;
-    if (hit.is_hit()) {
-        if (hit.normal.dot(path.exit_direction) >= 0.0f) return result;
-        const Mesh& mesh = scene.mesh(hit.part);
-        const std::optional<Rgb> seen =
-            lookup.background({hit_point(mesh, hit), shading_normal(mesh, hit)}, -1);
-        if (!seen) return result;
-        background = *seen;
-    }
-    const RefractedPath inner = trace_inner(eye, direction);
-    if (inner.is_valid) {
-        result.inner =
-            inner.transmittance * environment(scene, inner.exit, inner.exit_direction, ambient);
-        result.inner_length_m = inner.length_m;
-    }
-    result.transmitted = path.transmittance * background;
-    result.reflected =
-        path.entry_reflectance *
-        environment(scene, path.entry, reflect(-direction, path.entry_normal), ambient);
-    result.length_m = path.length_m;
-    result.is_valid = true;
-    return result;
-}
-
-/// Mean over a square of rays in every pixel: glass turns a pixel into a wide patch of what lies
-/// behind, or a small one.
-template <typename Trace, typename TraceInner>
-std::vector<ThroughPixel> predict(const EstimationScene& scene, const FrameLookup& lookup,
-                                  const std::vector<ObjectPixel>& pixels, const Rgb& ambient,
-                                  const Trace& trace, const TraceInner& trace_inner) {
-    std::vector<ThroughPixel> result(pixels.size());
-    parallel_for(pixels.size(), 16, [&](std::size_t i) {
-        const ObjectPixel& pixel = pixels[i];
-        const Camera& camera = lookup.cameras()[static_cast<std::size_t>(pixel.frame)];
-        ThroughPixel sum;
-        int valid = 0;
-        for (int k = 0; k < kRays * kRays; ++k) {
-            const double du = (k % kRays + 0.5) / kRays - 0.5;
-            const double dv = (k / kRays + 0.5) / kRays - 0.5;
-            const Vec3f direction = camera.ray_in_world(pixel.u + du, pixel.v + dv).cast<float>();
-            const ThroughPixel ray =
-                predict_ray(scene, lookup, pixel.eye, direction, ambient, trace, trace_inner);
-            if (!ray.is_valid) continue;
-            ++valid;
-            sum.transmitted += ray.transmitted;
-            sum.reflected += ray.reflected;
-            sum.inner += ray.inner;
-            sum.length_m += ray.length_m;
-            sum.inner_length_m += ray.inner_length_m;
-        }
-        if (2 * valid <= kRays * kRays) return;
-        const float share = 1.0f / static_cast<float>(valid);
-        sum.transmitted *= share;
-        sum.reflected *= share;
-        sum.inner *= share;
-        sum.length_m *= share;
-        sum.inner_length_m *= share;
-        sum.is_valid = true;
-        result[i] = sum;
-    });
-    return result;
-}
 
 double pixel_cost(const ThroughPixel& t, const ObjectPixel& p, const Rgb& sigma_a, double bright) {
-    const Rgb model = t.transmitted * (-sigma_a * t.length_m).exp() + t.side_light(sigma_a);
-    return std::min(static_cast<double>((model - p.radiance).abs().mean()) / bright, kCap);
+    const Rgb residual = t.radiance(sigma_a) - p.radiance;
+    return std::min(static_cast<double>(residual.abs().mean()) / bright, kCap);
+}
+
+/// Half the stretch of rising `x` around the least `cost` on which it is less than `factor` times
+/// that; straight between the trials, and no further than they go.
+double half_width(const std::vector<double>& x, const std::vector<double>& cost, double factor) {
+    const auto least = std::min_element(cost.begin(), cost.end()) - cost.begin();
+    const double limit = factor * cost[static_cast<std::size_t>(least)];
+    const auto reach = [&](std::ptrdiff_t step) {
+        const auto last = step > 0 ? static_cast<std::ptrdiff_t>(x.size()) - 1 : 0;
+        for (std::ptrdiff_t k = least; k != last; k += step) {
+            const auto here = static_cast<std::size_t>(k),
+                       next = static_cast<std::size_t>(k + step);
+            if (cost[next] <= limit) continue;
+            const double share = (limit - cost[here]) / (cost[next] - cost[here]);
+            return x[here] + share * (x[next] - x[here]);
+        }
+        return x[static_cast<std::size_t>(last)];
+    };
+    return 0.5 * (reach(1) - reach(-1));
+}
+
+/// Between the trials around the best, far enough apart to be more than noise.
+Rgb slope_around(const std::vector<double>& x, const std::vector<Rgb>& y, double best) {
+    constexpr double kNear = 0.01;
+    const auto above = std::find_if(x.begin(), x.end(), [&](double v) { return v > best + kNear; });
+    const auto past_below =
+        std::find_if(x.begin(), x.end(), [&](double v) { return v >= best - kNear; });
+    if (above == x.end() || past_below == x.begin()) return Rgb::Zero();
+    const auto high = static_cast<std::size_t>(above - x.begin());
+    const auto low = static_cast<std::size_t>(past_below - x.begin()) - 1;
+    return (y[high] - y[low]) / static_cast<float>(x[high] - x[low]);
+}
+
+double typical_length(const std::vector<ThroughPixel>& through) {
+    std::vector<double> lengths;
+    for (const ThroughPixel& t : through)
+        if (t.is_valid) lengths.push_back(t.length_m);
+    return lengths.empty() ? 0.0 : quantile(lengths, 0.5);
 }
 
 }  // namespace
@@ -178,32 +134,6 @@ std::vector<int> resample_views(const std::vector<ObjectPixel>& pixels, int view
     return count;
 }
 
-std::vector<ThroughPixel> look_through(const EstimationScene& scene, const FrameLookup& lookup,
-                                       int object, const std::vector<ObjectPixel>& pixels,
-                                       double ior, const Rgb& ambient) {
-    return predict(
-        scene, lookup, pixels, ambient,
-        [&](const Vec3f& eye, const Vec3f& direction) {
-            return refract_through(scene, object, eye, direction, static_cast<float>(ior));
-        },
-        [&](const Vec3f& eye, const Vec3f& direction) {
-            return refract_through(scene, object, eye, direction, static_cast<float>(ior), 1);
-        });
-}
-
-std::vector<ThroughPixel> look_through_vessel(const EstimationScene& scene,
-                                              const FrameLookup& lookup, int object,
-                                              const std::vector<ObjectPixel>& pixels, double ior,
-                                              double wall_m, const Rgb& ambient) {
-    const Vessel vessel(scene.mesh(scene.part_of_object(object)), wall_m);
-    return predict(
-        scene, lookup, pixels, ambient,
-        [&](const Vec3f& eye, const Vec3f& direction) {
-            return vessel.pass(eye, direction, static_cast<float>(ior));
-        },
-        [](const Vec3f&, const Vec3f&) { return RefractedPath{}; });
-}
-
 TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup, int object,
                          const std::vector<ObjectPixel>& pixels, double bright,
                          const TransparentOptions& options) {
@@ -217,20 +147,44 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     std::vector<double> trial;
     std::vector<std::vector<ThroughPixel>> predicted;
     double greatest = 0.0;
+    Rgb beyond = options.ambient;
+    const auto at_index = [&](double ior) {
+        return look_through(scene, lookup, object, pixels, ior, beyond);
+    };
     const auto evaluate = [&](double ior) {
-        predicted.push_back(look_through(scene, lookup, object, pixels, ior, options.ambient));
-        trial.push_back(ior);
+        const std::size_t k =
+            static_cast<std::size_t>(std::find(trial.begin(), trial.end(), ior) - trial.begin());
+        if (k == trial.size()) {
+            predicted.push_back(at_index(ior));
+            trial.push_back(ior);
+        }
         const double cost =
-            through_cost(predicted.back(), pixels, sigma_for(predicted.back(), {}), bright, {});
+            through_cost(predicted[k], pixels, sigma_for(predicted[k], {}), bright, {});
         greatest = std::max(greatest, cost);
         return cost;
+    };
+    const auto learn_beyond = [&](double ior) {
+        if (options.is_ambient_known) return;
+        const std::optional<Rgb> radiance =
+            radiance_beyond(at_index(ior), pixels, bright, beyond, options.known_sigma_a);
+        log_debug("beyond the scan: {:.4f} {:.4f} {:.4f} assumed, {:.4f} {:.4f} {:.4f} seen",
+                  beyond[0], beyond[1], beyond[2], radiance.value_or(beyond)[0],
+                  radiance.value_or(beyond)[1], radiance.value_or(beyond)[2]);
+        if (!radiance) return;
+        for (std::vector<ThroughPixel>& through : predicted)
+            add_beyond(through, *radiance - beyond);
+        beyond = *radiance;
+        greatest = 0.0;
     };
     double best_ior = 0.0;
     if (options.known_ior) {
         best_ior = *options.known_ior;
+        learn_beyond(best_ior);
         evaluate(best_ior);
     } else {
-        Minimum1d minimum =
+        learn_beyond(
+            minimise_grid_golden(evaluate, options.ior_min, options.ior_max, kIorGrid, 0).x);
+        const Minimum1d minimum =
             minimise_grid_golden(evaluate, options.ior_min, options.ior_max, kIorGrid, 9);
         best_ior = minimum.x;
         if (options.ior_step > 0.0)
@@ -245,28 +199,13 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
         fit.ior.outcome = minimum.is_at_bound ? Outcome::AtBound : Outcome::Converged;
         if (minimum.is_at_bound) fit.ior.reason = "the best index lies at the end of the range";
     }
-    const std::vector<ThroughPixel> best =
-        look_through(scene, lookup, object, pixels, best_ior, options.ambient);
+    const std::vector<ThroughPixel> best = at_index(best_ior);
+    fit.beyond = beyond;
     fit.ior.value = best_ior;
     fit.sigma_a_per_m.value = sigma_for(best, {});
     fit.cost = through_cost(best, pixels, fit.sigma_a_per_m.value, bright, {});
     fit.explained = share_explained(best);
     fit.ior.residual_rms = fit.sigma_a_per_m.residual_rms = fit.cost;
-
-    // Between the trials around the best, far enough apart to be more than noise.
-    const auto absorption_slope = [&]() {
-        constexpr double kNear = 0.01;
-        std::size_t below = trial.size(), above = trial.size();
-        for (std::size_t k = 0; k < trial.size(); ++k) {
-            if (trial[k] < best_ior - kNear && (below == trial.size() || trial[k] > trial[below]))
-                below = k;
-            if (trial[k] > best_ior + kNear && (above == trial.size() || trial[k] < trial[above]))
-                above = k;
-        }
-        if (below == trial.size() || above == trial.size()) return Rgb(Rgb::Zero());
-        return Rgb((sigma_for(predicted[above], {}) - sigma_for(predicted[below], {})) /
-                   static_cast<float>(trial[above] - trial[below]));
-    };
 
     // Bootstrap over views among the trials already traced, with a parabola between them.
     std::vector<double> iors;
@@ -276,6 +215,20 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
     std::sort(order.begin(), order.end(),
               [&](std::size_t a, std::size_t b) { return trial[a] < trial[b]; });
+    const auto doubt_of = [&]() {
+        SolidDoubt doubt;
+        doubt.length_m = typical_length(best);
+        std::vector<double> iors_rising, cost;
+        std::vector<Rgb> absorption;
+        for (const std::size_t k : order) {
+            iors_rising.push_back(trial[k]);
+            absorption.push_back(sigma_for(predicted[k], {}));
+            cost.push_back(through_cost(predicted[k], pixels, absorption.back(), bright, {}));
+        }
+        doubt.ior_half_width = half_width(iors_rising, cost, kAlikeCost);
+        doubt.absorption_per_ior = slope_around(iors_rising, absorption, best_ior);
+        return doubt;
+    };
     for (int round = 0; round < kBootstrapRounds; ++round) {
         const std::vector<int> count =
             resample_views(pixels, views, static_cast<std::uint64_t>(round));
@@ -297,7 +250,7 @@ TransparentFit fit_solid(const EstimationScene& scene, const FrameLookup& lookup
     for (int c = 0; c < 3 && !options.known_sigma_a; ++c)
         fit.sigma_a_per_m.stddev[c] =
             static_cast<float>(standard_deviation(sigmas[static_cast<std::size_t>(c)]));
-    add_model_error(fit, options, absorption_slope());
+    add_model_error(fit, options, doubt_of());
     fit.sigma_a_per_m.outcome = Outcome::Converged;
     if (options.known_ior) fit.ior.outcome = Outcome::Converged;
     if (fit.explained < kMinExplained) {

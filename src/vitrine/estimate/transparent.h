@@ -18,7 +18,8 @@ struct TransparentOptions {
     double ior_step = 0.0;         ///< > 0: answers only on this grid (the paper's lambda)
     std::vector<double> ior_grid;  ///< answers only on these (a lambda that varies), rising
     double shell_ior = 1.5;        ///< assumed for vessels: thin walls hardly bend light
-    Rgb ambient = Rgb::Zero();
+    Rgb ambient = Rgb::Zero();     ///< beyond the scan, where glass does not show it better
+    bool is_ambient_known = false;
     std::optional<double> known_ior;
     std::optional<Rgb> known_sigma_a;
 };
@@ -32,9 +33,17 @@ struct ThroughPixel {
     float length_m = 0.0f;
     Rgb inner = Rgb::Zero();
     float inner_length_m = 0.0f;
+    /// How much of each comes from beyond the scan, per unit of the radiance there; the ambient
+    /// light's is already in.
+    struct Beyond {
+        float transmitted = 0.0f, reflected = 0.0f, inner = 0.0f;
+    } beyond;
     /// All but the main way.
     Rgb side_light(const Rgb& sigma_a) const {
         return reflected + inner * (-sigma_a * inner_length_m).exp();
+    }
+    Rgb radiance(const Rgb& sigma_a) const {
+        return transmitted * (-sigma_a * length_m).exp() + side_light(sigma_a);
     }
 };
 
@@ -43,8 +52,9 @@ constexpr double kMinSolidLength = 0.005;  ///< metres
 struct TransparentFit {
     Estimate<double> ior;
     Estimate<Rgb> sigma_a_per_m{Rgb::Zero(), Rgb::Zero(), 0.0, Outcome::NotIdentifiable, {}};
-    double cost = 1.0;       ///< mean of min(|residual| / bright level, 0.25)
-    double explained = 0.0;  ///< share of pixels with a prediction
+    double cost = 1.0;         ///< mean of min(|residual| / bright level, 0.25)
+    double explained = 0.0;    ///< share of pixels with a prediction
+    Rgb beyond = Rgb::Zero();  ///< radiance taken for what lies beyond the scan
     bool is_shell = false;
     Estimate<double> wall_m;  ///< of a shell
 };

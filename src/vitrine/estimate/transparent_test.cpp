@@ -19,8 +19,8 @@ struct Ball {
     std::vector<RgbdFrame> frames;
 
     /// @param pattern 0: table and surroundings of one even radiance
-    Ball(double ior, const Rgb& sigma_a, float pattern, double wall_m = 0.0) {
-        Mesh table = make_plane(1.6, 0.0, 240);
+    Ball(double ior, const Rgb& sigma_a, float pattern, double wall_m = 0.0, double table_m = 1.6) {
+        Mesh table = make_plane(table_m, 0.0, 240);
         table.colours.clear();
         for (const Vec3f& v : table.vertices) {
             const float wave = std::sin(90.0f * v.x()) * std::sin(70.0f * v.y() + 1.0f);
@@ -75,16 +75,20 @@ struct Ball {
         }
     }
 
-    TransparentFit fit(const TransparentOptions& options = {}) const {
+    TransparentFit fit(const TransparentOptions& options = lit()) const {
         return fit_with(fit_solid, options);
     }
-    TransparentFit fit_as_vessel() const { return fit_with(fit_shell, {}); }
+    TransparentFit fit_as_vessel() const { return fit_with(fit_shell, lit()); }
+    static TransparentOptions lit() {
+        TransparentOptions options;
+        options.ambient = kAmbient;
+        return options;
+    }
 
     template <typename Fit>
-    TransparentFit fit_with(const Fit& fit, TransparentOptions options) const {
+    TransparentFit fit_with(const Fit& fit, const TransparentOptions& options) const {
         const EstimationScene world(scene);
         const FrameLookup lookup(world, scene.cameras, frames, 1e9);
-        options.ambient = kAmbient;
         return fit(world, lookup, 0, object_pixels(world, lookup, 0), bright_level(lookup),
                    options);
     }
@@ -108,7 +112,7 @@ TEST(FitSolid, SaysThatAnEvenBackgroundShowsNoIndex) {
 }
 
 TEST(FitSolid, SaysWhenTheIndexLiesAtTheEndOfTheRange) {
-    TransparentOptions options;
+    TransparentOptions options = Ball::lit();
     options.ior_min = 1.4;
     const TransparentFit fit = Ball(1.25, Rgb::Zero(), 1.0f).fit(options);
     EXPECT_EQ(fit.ior.outcome, Outcome::AtBound);
@@ -116,7 +120,7 @@ TEST(FitSolid, SaysWhenTheIndexLiesAtTheEndOfTheRange) {
 }
 
 TEST(FitSolid, AnswersOnTheGridAskedFor) {
-    TransparentOptions options;
+    TransparentOptions options = Ball::lit();
     options.ior_step = 0.02;
     const TransparentFit fit = Ball(1.463, Rgb::Zero(), 1.0f).fit(options);
     EXPECT_NEAR(fit.ior.value, 1.46, 1e-9);
@@ -127,12 +131,13 @@ TEST(FitSolid, TheDoubtOfTheIndexGoesOnIntoTheAbsorption) {
     fit.cost = 0.04;
     fit.sigma_a_per_m.value = Rgb(1, 2, 3);
     TransparentFit steep = fit, known = fit;
-    add_model_error(fit, {}, Rgb::Zero());
-    add_model_error(steep, {}, Rgb(0, 50, -50));
+    const SolidDoubt flat_doubt{0.01, Rgb::Zero(), 0.05}, doubt{0.01, Rgb(0, 50, -50), 0.05};
+    add_model_error(fit, {}, flat_doubt);
+    add_model_error(steep, {}, doubt);
     TransparentOptions options;
     options.known_ior = 1.5;
-    add_model_error(known, options, Rgb(0, 50, -50));
-    EXPECT_GT(fit.ior.stddev, 0.0);
+    add_model_error(known, options, doubt);
+    EXPECT_GE(fit.ior.stddev, 0.01);
     EXPECT_EQ(known.ior.stddev, 0.0);
     for (int c = 0; c < 3; ++c) {
         EXPECT_EQ(known.sigma_a_per_m.stddev[c], fit.sigma_a_per_m.stddev[c]);
@@ -140,6 +145,30 @@ TEST(FitSolid, TheDoubtOfTheIndexGoesOnIntoTheAbsorption) {
                     std::hypot(fit.sigma_a_per_m.stddev[c], c == 0 ? 0.0 : 50 * fit.ior.stddev),
                     1e-4);
     }
+}
+
+/// A scan so small that much of what is seen through the ball lies beyond it.
+TEST(FitSolid, LearnsHowBrightItIsBeyondTheScan) {
+    const Rgb sigma_a(4, 1, 8);
+    const Ball ball(1.6, sigma_a, 1.0f, 0.0, 0.12);
+    TransparentOptions options;
+    options.ambient = 0.7f * Ball::kAmbient;
+    const TransparentFit fit = ball.fit(options);
+    EXPECT_NEAR(fit.ior.value, 1.6, 0.01);
+    for (int c = 0; c < 3; ++c) {
+        EXPECT_NEAR(fit.beyond[c], Ball::kAmbient[c], 0.02f);
+        EXPECT_NEAR(fit.sigma_a_per_m.value[c], sigma_a[c], 0.3);
+    }
+    options.is_ambient_known = true;
+    const TransparentFit misled = ball.fit(options);
+    EXPECT_GT((misled.sigma_a_per_m.value - sigma_a).abs().maxCoeff(), 0.3f);
+}
+
+TEST(FitSolid, KeepsTheAmbientLightWhereGlassShowsNothingElse) {
+    TransparentOptions options;
+    options.ambient = 0.7f * Ball::kAmbient;
+    const TransparentFit fit = Ball(1.46, Rgb(4, 1, 8), 1.0f).fit(options);
+    EXPECT_TRUE((fit.beyond == options.ambient).all());
 }
 
 TEST(FitShell, RecoversItsOwnWall) {
