@@ -130,7 +130,9 @@ Relief true_cluster(const TruthPhoto& truth, const Relief& found) {
             above += (points[i] - p_mean).dot(normals[i] - n_mean);
             below += (normals[i] - n_mean).squaredNorm();
         }
-        const double radius = above / below;
+        // A sliver says little of its ball's size.
+        const double found_radius = found.balls[k].radius_px;
+        const double radius = std::clamp(above / below, 0.85 * found_radius, 1.15 * found_radius);
         balls.push_back({(p_mean - radius * n_mean).cast<float>(), static_cast<float>(radius)});
     }
     return relief_of_balls(truth.photo.mask, balls);

@@ -2,6 +2,7 @@
 
 #include "base/parallel.h"
 #include "compose/object_irradiance.h"
+#include "estimate/ball_heights.h"
 #include "estimate/highlight_light.h"
 #include "estimate/relief_refinement.h"
 #include "image/colour.h"
@@ -59,6 +60,18 @@ PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptio
                                                 analysis.highlights.grown, seen, light_options);
         };
         analysis.lights = analysis.explaining = estimate(analysis.highlight_lights, true);
+        if (analysis.relief.is_cluster()) {
+            progress.update(0.6, "heights of the balls");
+            BallHeightOptions heights;
+            heights.eta = light_options.eta;
+            analysis.relief = relief_of_balls(
+                photo.mask,
+                refine_ball_heights(analysis.relief, analysis.highlights.diffuse,
+                                    analysis.highlights.grown, analysis.lights, heights));
+            progress.update(0.8, "lights");
+            analysis.lights = analysis.explaining = estimate(analysis.highlight_lights, true);
+            analysis.relief.ball_albedo = analysis.lights.ball_albedo;
+        }
         if (role == Role::Material && !analysis.relief.is_cluster()) {
             progress.update(0.5, "shape and lights");
             analysis.explaining = estimate(analysis.highlight_lights, false);

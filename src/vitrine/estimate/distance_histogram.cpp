@@ -32,7 +32,10 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
     for (std::size_t i = 0; i < relief.mask.size(); ++i) {
         if (relief.mask[i] <= 127 || (!excluded.empty() && excluded[i] > 127)) continue;
         if (rim[i] <= rim_px || relief.normals[i].z() <= min_cos) continue;
-        if (relief.is_cluster() && relief.ball_of[i] < 0) continue;
+        if (relief.is_cluster()) {
+            const std::int16_t ball = relief.ball_of[i];
+            if (ball < 0 || relief.balls[static_cast<std::size_t>(ball)].is_mostly_hidden) continue;
+        }
         usable.push_back(i);
     }
     Rng rng(seed);

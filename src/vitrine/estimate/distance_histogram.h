@@ -40,7 +40,8 @@ struct ReliefObservations {
 };
 
 /// Draws `count` pixels without replacement from the mask minus `excluded` minus a rim of
-/// `rim_px`, facing the viewer with n_z > `min_cos`. Fewer when there are fewer.
+/// `rim_px`, facing the viewer with n_z > `min_cos`, mostly hidden balls left out. Fewer when there
+/// are fewer.
 ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
                                      double rim_px, double min_cos, std::uint64_t seed);
 

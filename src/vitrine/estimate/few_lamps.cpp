@@ -19,6 +19,10 @@ constexpr int kTurns = 6;
 constexpr double kDarkest = 0.2;
 /// Of the brightest channel, for the gain of closed bodies.
 constexpr double kBrightestAlbedo = 0.7;
+/// Of that, what balls throw on each other: they see less of each other's lit sides than the guess
+/// of what lies behind says, or more. The first is where the search starts.
+constexpr double kBounceShares[] = {0.5, 0.0, 0.25, 0.75, 1.0};
+constexpr double kUsualBounce = kBounceShares[0];
 
 TwoExponentials single_exponential(double length) {
     return {1 / (2 * kPi * length * length), -1 / length, 0, -1 / length};
@@ -55,9 +59,18 @@ class Fit {
         const LightFields fields = object_.fields(directions, true);
         // All channels at once: they differ in how the closed body weighs the same distances.
         const Index count = fields.source.cols();
-        const DistanceHistogram histogram(
-            object_.observations(), object_.samples(), fields.source.replicate(1, kChannels),
-            fields.local.replicate(1, kChannels), repeated_bodies(static_cast<std::size_t>(count)));
+        LightFields lit;
+        lit.source.resize(fields.source.rows(), kChannels * count);
+        lit.local.resize(fields.local.rows(), kChannels * count);
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            const LightFields own =
+                object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]);
+            lit.source.middleCols(static_cast<Index>(c) * count, count) = own.source;
+            lit.local.middleCols(static_cast<Index>(c) * count, count) = own.local;
+        }
+        const DistanceHistogram histogram(object_.observations(), object_.samples(), lit.source,
+                                          lit.local,
+                                          repeated_bodies(static_cast<std::size_t>(count)));
         std::array<LengthImages, kChannels> images;
         for (const double length : lengths_) {
             const MatrixXd all = histogram.image_of(plain_exponential(length));
@@ -94,7 +107,8 @@ class Fit {
         }
     }
 
-    /// How much more a closed body passes follows from the albedos, up to the common factor.
+    /// How much more a closed body passes, and what balls throw on each other, follows from the
+    /// albedos, up to the common factor.
     void set_bodies(const RgbExponentials& kernel) {
         std::array<double, kChannels> albedo{};
         double brightest = 1e-12;
@@ -103,9 +117,9 @@ class Fit {
             brightest = std::max(brightest, albedo[c]);
         }
         for (int c = 0; c < kChannels; ++c) {
-            body_[c] = options_.use_curved_body
-                           ? curved_body_factor(kBrightestAlbedo * albedo[c] / brightest)
-                           : CurvedBodyFactor{};
+            albedo_[c] = kBrightestAlbedo * albedo[c] / brightest;
+            body_[c] =
+                options_.use_curved_body ? curved_body_factor(albedo_[c]) : CurvedBodyFactor{};
         }
     }
 
@@ -124,7 +138,10 @@ class Fit {
             const LightFields fields = object_.fields({direction}, false);
             std::array<MatrixXd, kChannels> moved = images;
             for (int c = 0; c < kChannels; ++c)
-                moved[c].col(static_cast<Index>(l)) = operators[c](fields).col(0);
+                moved[c].col(static_cast<Index>(l)) =
+                    operators[c](
+                        object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]))
+                        .col(0);
             solve_intensities(moved, trial);
             if (cost(trial) >= cost(lamps) - 5e-4 * options_.looks) return false;
             lamps = std::move(trial);
@@ -165,6 +182,26 @@ class Fit {
         }
         return sum;
     }
+
+    /// How strongly balls light each other explains the picture best; kernels and directions kept.
+    void fit_bounce(FewLamps& lamps) {
+        if (!object_.is_cluster()) return;
+        const std::vector<KernelImage> operators = operators_of(lamps);
+        FewLamps best;
+        double best_share = bounce_share_;
+        for (const double share : kBounceShares) {
+            bounce_share_ = share;
+            FewLamps trial = lamps;
+            solve_intensities(kernel_images(trial, operators), trial);
+            if (trial.misfit >= best.misfit) continue;
+            best = std::move(trial);
+            best_share = share;
+        }
+        bounce_share_ = best_share;
+        lamps = std::move(best);
+    }
+
+    Rgbd ball_albedo() const { return bounce_share_ * albedo_; }
 
     double relative_residual(const FewLamps& lamps) const {
         const std::array<MatrixXd, kChannels> images = kernel_images(lamps, operators_of(lamps));
@@ -214,7 +251,8 @@ class Fit {
         const LightFields fields = object_.fields(lamps.directions, true);
         std::array<MatrixXd, kChannels> images;
         for (std::size_t c = 0; c < kChannels; ++c) {
-            images[c] = operators[c](fields);
+            images[c] =
+                operators[c](object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]));
             images[c].rightCols<1>() *= ground_colour_[static_cast<int>(c)];
         }
         return images;
@@ -272,6 +310,8 @@ class Fit {
     MatrixXd base_weight_, weight_;  // square roots
     std::vector<double> lengths_;
     std::array<CurvedBodyFactor, kChannels> body_;
+    Rgbd albedo_ = Rgbd::Zero();
+    double bounce_share_ = kUsualBounce;  // of it, that balls throw on each other
 };
 
 /// Takes away the lamps that the picture hardly misses.
@@ -316,6 +356,7 @@ void join_neighbours(const Fit& fit, FewLamps& lamps, const FewLampsOptions& opt
 /// Kernels and weights under the directions as they are.
 void settle(Fit& fit, FewLamps& lamps) {
     fit.set_bodies(lamps.kernel);
+    fit.fit_bounce(lamps);
     fit.reweight(lamps);
     lamps = fit.fit_kernels(lamps.directions, lamps.seen_at);
 }
@@ -364,6 +405,7 @@ FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const 
         *std::min_element(candidates.begin(), candidates.end(),
                           [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
     polish(best, options);
+    best.lamps.ball_albedo = best.fit.ball_albedo();
     return best.lamps;
 }
 

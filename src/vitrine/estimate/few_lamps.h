@@ -47,6 +47,7 @@ struct FewLamps {
     std::vector<SeenAt> seen_at;  ///< of each
     Eigen::VectorXd intensity;    ///< of the directions, then from everywhere, then from below
     std::array<TwoExponentials, 3> kernel;  ///< with the albedos, up to the common factor
+    Rgbd ball_albedo = Rgbd::Zero();        ///< by which balls light each other
     double misfit = 1e300;                  ///< sum of squares, weighted, prices included
     double relative_residual = 0;           ///< rms
 };

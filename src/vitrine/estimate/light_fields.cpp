@@ -13,10 +13,23 @@ LitRelief::LitRelief(const Relief& relief, ReliefSamples samples, ReliefObservat
       observations_(std::move(observations)),
       sample_points_{samples_.position, samples_.normal, samples_.ball},
       observation_points_{observations_.position, observations_.normal, observations_.ball},
-      sample_sky_(sky_shares(occluder_, sample_points_)),
-      observation_sky_(sky_shares(occluder_, observation_points_)),
       eta_(eta),
-      use_shadows_(use_shadows) {}
+      use_shadows_(use_shadows) {
+    if (!relief.is_cluster() || !use_shadows) {
+        sample_sky_ = sky_shares(occluder_, sample_points_);
+        observation_sky_ = sky_shares(occluder_, observation_points_);
+        return;
+    }
+    bounce_.emplace(relief);
+    const auto look = [&](const SurfacePoints& points, SkyShares& sky) {
+        BallBounce::View view = bounce_->view_from(points);
+        sky = std::move(view.sky);
+        return std::move(view.patches);
+    };
+    sample_view_ = look(sample_points_, sample_sky_);
+    observation_view_ = look(observation_points_, observation_sky_);
+    look(bounce_->patches(), patch_sky_);
+}
 
 void LitRelief::fill(Eigen::MatrixXf& field, const SurfacePoints& points,
                      const std::vector<Vec3>& directions, const SkyShares* sky) const {
@@ -44,8 +57,22 @@ LightFields LitRelief::fields(const std::vector<Vec3>& directions, bool with_sky
     LightFields result;
     fill(result.source, sample_points_, directions, with_sky ? &sample_sky_ : nullptr);
     fill(result.local, observation_points_, directions, with_sky ? &observation_sky_ : nullptr);
+    if (bounce_)
+        fill(result.patch, bounce_->patches(), directions, with_sky ? &patch_sky_ : nullptr);
     for (Index i = 0; i < result.source.rows(); ++i)
         result.source.row(i) *= samples_.area_px2[static_cast<std::size_t>(i)];
+    return result;
+}
+
+LightFields LitRelief::bounced(const LightFields& direct, double albedo) const {
+    if (!bounce_ || albedo <= 0) return direct;
+    LightFields result = direct;
+    const Eigen::MatrixXf exitance = bounce_->exitance(direct.patch, albedo);
+    Eigen::MatrixXf added = sample_view_ * exitance;
+    for (Index i = 0; i < added.rows(); ++i)
+        added.row(i) *= samples_.area_px2[static_cast<std::size_t>(i)];
+    result.source += added;
+    result.local += observation_view_ * exitance;
     return result;
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include "estimate/distance_histogram.h"
-#include "render/relief_light.h"
+#include "render/ball_bounce.h"
+
+#include <optional>
 
 namespace vitrine {
 
@@ -11,6 +13,7 @@ namespace vitrine {
 /// the observed points.
 struct LightFields {
     Eigen::MatrixXf source, local;
+    Eigen::MatrixXf patch;  ///< of a cluster: at BallBounce::patches()
 };
 
 /// What a fit of lights knows of the object: where light enters and where it is seen.
@@ -23,9 +26,14 @@ class LitRelief {
     const ReliefSamples& samples() const { return samples_; }
     const ReliefObservations& observations() const { return observations_; }
 
+    bool is_cluster() const { return bounce_.has_value(); }
+
     /// Columns: the directions, then (if asked for) light from everywhere and from below.
     /// Costs about 1 ms per direction and 1000 points, most of it the object's own shadows.
     LightFields fields(const std::vector<Vec3>& directions, bool with_sky) const;
+
+    /// With what balls of this albedo throw on each other; of one body, the same.
+    LightFields bounced(const LightFields& direct, double albedo) const;
 
   private:
     void fill(Eigen::MatrixXf& field, const SurfacePoints& points,
@@ -36,6 +44,9 @@ class LitRelief {
     ReliefObservations observations_;
     SurfacePoints sample_points_, observation_points_;
     SkyShares sample_sky_, observation_sky_;
+    std::optional<BallBounce> bounce_;  // of a cluster
+    SkyShares patch_sky_;
+    Eigen::MatrixXf sample_view_, observation_view_;
     double eta_;
     bool use_shadows_;
 };

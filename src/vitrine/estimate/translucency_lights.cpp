@@ -19,6 +19,8 @@ using Eigen::VectorXd;
 
 /// Of wax, milk, marble and flesh; C(s) changes little around it.
 constexpr double kTypicalAlbedo = 0.6;
+/// By which balls light each other, before it is fitted (few_lamps.h).
+constexpr double kUsualBounce = 0.3;
 /// Light thrown back by the ground is common, but dearer than a lamp: it must earn its place.
 constexpr double kGroundPrice = 2.0;
 /// Few lamps are cheaper than many.
@@ -258,6 +260,8 @@ void set_lights(const FewLamps& lamps, const Rgbd& ground, ViewLightsEstimate& r
     result.lights.ambient = Rgbd::Constant(sky[0]);
     result.lights.from_below = ground * sky[1];
     result.relative_residual = lamps.relative_residual;
+    result.ball_albedo = lamps.ball_albedo;
+    result.kernel = lamps.kernel;
     double sum = 0, count = 0;
     for (const TwoExponentials& kernel : lamps.kernel) {
         sum += kernel.mean_radius();
@@ -322,7 +326,7 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
     price[count] = options.direction_penalty * std::pow(12.0, s);
     price[count + 1] = options.use_ground ? options.direction_penalty * kGroundPrice : 1e3;
 
-    const LightFields fields = object.fields(directions, true);
+    const LightFields fields = object.bounced(object.fields(directions, true), kUsualBounce);
     const DistanceHistogram histogram(observations, object.samples(), fields.source, fields.local,
                                       {factor});
     progress.update(0.4, "lights: light fields");

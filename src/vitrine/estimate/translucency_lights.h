@@ -4,6 +4,7 @@
 #include "base/progress.h"
 #include "estimate/estimate.h"
 #include "estimate/highlight_light.h"
+#include "optics/radial_profile.h"
 #include "scene/relief.h"
 
 #include <span>
@@ -36,10 +37,12 @@ struct TranslucencyLightOptions {
 };
 
 struct ViewLightsEstimate {
-    ViewLights lights;             ///< white, strongest first, normalised (scene/relief.h)
-    double relative_residual = 0;  ///< rms of (model - picture) / picture, weighted
-    double kernel_px = 0;          ///< mean radius of the kernel that explained the picture best
-    double ambient_share = 0;      ///< of all light
+    ViewLights lights;                ///< white, strongest first, normalised (scene/relief.h)
+    double relative_residual = 0;     ///< rms of (model - picture) / picture, weighted
+    double kernel_px = 0;             ///< mean radius of the kernel that explained the picture best
+    RgbExponentials kernel;           ///< of each channel, over its mean; 0: too dark to tell
+    Rgbd ball_albedo = Rgbd::Zero();  ///< of a cluster (Relief::ball_albedo)
+    double ambient_share = 0;         ///< of all light
     Outcome outcome = Outcome::Converged;
     std::string reason;
     std::vector<std::string> warnings;  ///< plain sentences

@@ -1,5 +1,6 @@
 #include "base/parallel.h"
 #include "base/rng.h"
+#include "estimate/ball_heights.h"
 #include "estimate/bssrdf.h"
 #include "estimate/highlight_light.h"
 #include "estimate/highlights.h"
@@ -8,7 +9,9 @@
 #include "estimate/relief_refinement.h"
 #include "estimate/translucency_lights.h"
 #include "estimate/translucent_world.h"
+#include "reconstruct/balls.h"
 #include "reconstruct/relief.h"
+#include "render/render_object.h"
 
 #include <gtest/gtest.h>
 
@@ -318,6 +321,47 @@ TEST(TranslucencyLights, HighlightsTellTheLampsWhereTheShapeIsWrong) {
         estimate_translucency_lights(world.diffuse, wavy, Mask(), highlights, {.use_votes = false});
     EXPECT_GT(nearest_deg(shading.lights, key) + nearest_deg(shading.lights, back),
               nearest_deg(voted.lights, key) + nearest_deg(voted.lights, back));
+}
+
+TEST(BallHeights, ShadowsTellHowFarABallLiesBefore) {
+    // The last ball lies 0.9 radii further before the others than touching asks for.
+    const std::vector<Ball> truth = {{Vec3f(60, -60, 0), 36},
+                                     {Vec3f(132, -62, 0), 36},
+                                     {Vec3f(62, -134, 0), 36},
+                                     {Vec3f(134, -134, 0), 36},
+                                     {Vec3f(104, -92, 86), 36}};
+    std::vector<Ball> touching = truth;
+    touching.back().centre_px.z() -= 33;
+    Mask mask(200, 200);
+    for (int y = 0; y < 200; ++y) {
+        for (int x = 0; x < 200; ++x) {
+            for (const Ball& ball : truth) {
+                const Vec2f v(static_cast<float>(x) - ball.centre_px.x(),
+                              static_cast<float>(-y) - ball.centre_px.y());
+                if (v.norm() < ball.radius_px) mask(x, y) = 255;
+            }
+        }
+    }
+    Relief relief = relief_of_balls(mask, truth);
+    relief.ball_albedo = Rgbd(0.3, 0.35, 0.1);
+    ViewLights lights;
+    lights.lights.push_back({Vec3(-0.6, 0.55, 0.58).normalized(), Rgbd::Constant(1.0)});
+    lights.lights.push_back({Vec3(0.75, 0.2, -0.63).normalized(), Rgbd::Constant(0.8)});
+    const ImageRgb picture = render_object(relief, lights, apple(5));
+    const Relief start = relief_of_balls(mask, touching);
+    const auto found = estimate_translucency_lights(picture, start, Mask(), {});
+    const std::vector<Ball> balls = refine_ball_heights(start, picture, Mask(), found);
+    const auto height = [](const std::vector<Ball>& all) {
+        float others = 0;
+        for (std::size_t k = 0; k + 1 < all.size(); ++k) others += all[k].centre_px.z();
+        return all.back().centre_px.z() - others / static_cast<float>(all.size() - 1);
+    };
+    EXPECT_NEAR(height(balls), height(truth), 15);  // 33 before
+    // From the truth there is nothing to gain.
+    const auto at_truth = estimate_translucency_lights(picture, relief, Mask(), {});
+    EXPECT_NEAR(height(refine_ball_heights(relief, picture, Mask(), at_truth)), height(truth), 8);
+    EXPECT_LT(at_truth.relative_residual, found.relative_residual);
+    EXPECT_GT(at_truth.ball_albedo[1], 0.1);  // that they light each other is seen
 }
 
 TEST(TranslucencyLights, GroundIsFoundWhereItShines) {

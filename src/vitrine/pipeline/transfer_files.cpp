@@ -103,6 +103,10 @@ void write_lights_json(const std::filesystem::path& path, const PhotoAnalysis& a
         to["lights"] = list(estimate.lights.lights);
         to["ambient_irradiance"] = triple(ambient[0], ambient[1], ambient[2]);
         to["from_below_irradiance"] = triple(below[0], below[1], below[2]);
+        if (analysis.relief.is_cluster()) {
+            const Rgbd& balls = estimate.ball_albedo;
+            to["ball_albedo"] = triple(balls[0], balls[1], balls[2]);
+        }
         to["relative_residual"] = estimate.relative_residual;
         to["outcome"] = outcome_name(estimate.outcome);
         to["reason"] = estimate.reason;

@@ -122,6 +122,51 @@ TEST(Balls, ABunchGoesOnBehindWhatIsSeen) {
     EXPECT_EQ(relief.balls.size(), 3u);
 }
 
+TEST(Balls, MostlyHiddenBallsFillTheGaps) {
+    std::vector<Ball> truth = grapes();
+    truth.push_back(
+        {Vec3f(38, -112, -60), 38});  // a third of it shows, beside the first and the last
+    const Picture picture = picture_of(truth);
+    const std::vector<Ball> found = find_balls(picture.shown, picture.mask);
+    const Ball* hidden = nullptr;
+    for (const Ball& ball : found)
+        if (ball.is_mostly_hidden) hidden = &ball;
+    ASSERT_NE(hidden, nullptr);
+    EXPECT_LT((hidden->centre_px - truth.back().centre_px).head<2>().norm(), 7);
+    EXPECT_NEAR(hidden->radius_px, 38, 5);
+    const Relief before = relief_of_balls(picture.mask, grapes());
+    const Relief relief = relief_of_balls(picture.mask, found);
+    const auto uncovered = [](const Relief& cluster) {
+        int count = 0;
+        for (std::size_t i = 0; i < cluster.mask.size(); ++i)
+            count += cluster.mask[i] > 127 && cluster.ball_of[i] < 0 ? 1 : 0;
+        return count;
+    };
+    EXPECT_LT(uncovered(relief), uncovered(before) / 3);
+}
+
+TEST(Balls, SolidBallsDoNotSinkIntoEachOther) {
+    // Each before the next: the first is further before the third than touching it would ask for.
+    const std::vector<Ball> truth = {{Vec3f(70, -80, 124), 40},
+                                     {Vec3f(120, -80, 62), 40},
+                                     {Vec3f(106, -128, 0), 40},
+                                     {Vec3f(185, -110, 20), 36},
+                                     {Vec3f(180, -170, 0), 34}};
+    const Picture picture = picture_of(truth);
+    const std::vector<Ball> found = find_balls(picture.shown, picture.mask);
+    std::array<const Ball*, 3> chain{};
+    for (const Ball& ball : found)
+        for (std::size_t k = 0; k < chain.size(); ++k)
+            if ((ball.centre_px - truth[k].centre_px).head<2>().norm() < 5) chain[k] = &ball;
+    for (const Ball* ball : chain) ASSERT_NE(ball, nullptr);
+    for (const auto& [front, back] : {std::pair{0, 1}, {1, 2}, {0, 2}}) {
+        const Ball &a = *chain[static_cast<std::size_t>(front)],
+                   &b = *chain[static_cast<std::size_t>(back)];
+        EXPECT_GT(a.centre_px.z(), b.centre_px.z());
+        EXPECT_GT((a.centre_px - b.centre_px).norm(), 0.93f * (a.radius_px + b.radius_px));
+    }
+}
+
 TEST(Balls, OneBodyIsNoCluster) {
     Picture picture = picture_of({{Vec3f(130, -110, 0), 90}});
     EXPECT_TRUE(find_balls(picture.shown, picture.mask).empty());

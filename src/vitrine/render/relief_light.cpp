@@ -1,6 +1,7 @@
 #include "render/relief_light.h"
 
 #include "base/parallel.h"
+#include "render/ball_bounce.h"
 
 #include <algorithm>
 
@@ -107,11 +108,12 @@ SkyShares sky_shares(const Occluder& occluder, const SurfacePoints& points, int 
     return shares;
 }
 
-std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,
-                                const ViewLights& lights, double eta, bool use_shadows) {
+namespace {
+
+std::vector<Rgb> direct_light(const Occluder& occluder, const SurfacePoints& points,
+                              const ViewLights& lights, double eta, bool use_shadows) {
     const std::size_t count = points.position.size();
     std::vector<Rgb> result(count);
-    const Occluder occluder(relief);
     SkyShares sky;
     if (use_shadows) {
         sky = sky_shares(occluder, points);
@@ -132,6 +134,17 @@ std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& point
         }
     }
     return result;
+}
+
+}  // namespace
+
+std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,
+                                const ViewLights& lights, double eta, bool use_shadows) {
+    const Occluder occluder(relief);
+    const auto direct = [&](const SurfacePoints& lit) {
+        return direct_light(occluder, lit, lights, eta, use_shadows);
+    };
+    return use_shadows ? with_bounces(relief, points, direct) : direct(points);
 }
 
 }  // namespace vitrine

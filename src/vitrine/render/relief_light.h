@@ -35,7 +35,8 @@ struct SkyShares {
 SkyShares sky_shares(const Occluder& occluder, const SurfacePoints& points,
                      int direction_count = 40);
 
-/// Irradiance that enters at the points. `use_shadows` false: as if nothing were in the way.
+/// Irradiance that enters at the points, from the other balls of a cluster too (ball_bounce.h).
+/// `use_shadows` false: as if nothing were in the way, and nothing beside.
 std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,
                                 const ViewLights& lights, double eta, bool use_shadows);
 

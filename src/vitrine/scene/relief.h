@@ -20,6 +20,7 @@ struct Ball {
     /// radius_px (1 + x cos 2t + y sin 2t). Berries are rarely quite round. Shadows and the light
     /// inside take the ball for round.
     Vec2f oval = Vec2f::Zero();
+    bool is_mostly_hidden = false;  ///< by those before it: where it lies is known less well
 };
 
 struct Relief {
@@ -36,6 +37,8 @@ struct Relief {
     /// Behind those: what no pixel shows, a guess. They only cast shadows.
     std::vector<Ball> unseen_balls;
     Image<std::int16_t> ball_of;  ///< which ball a pixel shows; -1: none. Empty without balls
+    /// How much of the light on them the balls throw back, on each other too. 0: they do not.
+    Rgbd ball_albedo = Rgbd::Zero();
 
     /// Height of the unseen back.
     float back_px(int x, int y) const {
