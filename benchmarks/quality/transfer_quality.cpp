@@ -361,9 +361,11 @@ int main(int argc, char** argv) {
                                        : truth.relief;
         const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points,
                                         double eta) { return true_light(truth, lit, points, eta); };
+        BssrdfOptions exact = options.bssrdf;
+        exact.is_level_known = true;
         const BodyEstimate known_body =
             estimate_body(true_relief, material.analysis.highlights.diffuse,
-                          material.analysis.highlights.grown, light, options.bssrdf);
+                          material.analysis.highlights.grown, light, exact);
         const MediumEstimate& known = known_body.medium;
         fmt::print("  {}, residuals {:.3f} {:.3f} {:.3f}\n",
                    known.is_fresnel ? "Fresnel" : "no Fresnel", known.channels[0].relative_residual,

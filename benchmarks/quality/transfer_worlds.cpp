@@ -227,6 +227,7 @@ Row run_world(int index, bool use_curved_body, bool with_ground, int refinement_
     for (Rgb& pixel : shown) pixel *= static_cast<float>(brightest / 0.75);
     BssrdfOptions exact = options.bssrdf;
     exact.smoothing = 0.01;
+    exact.is_level_known = true;
     const MediumEstimate known =
         estimate_bssrdf(shown, relief, lifted.analysis.highlights.grown, lights, exact);
     row.known = compare(known.profile(), truth);

@@ -33,11 +33,11 @@ ImageRgb smooth_inside(const ImageRgb& image, const Mask& mask, const Mask& excl
 
 const char* const kChannelNames[3] = {"red", "green", "blue"};
 
-/// Albedos as they will be once the brightest is brought down to a plausible one.
-std::vector<CurvedBodyFactor> body_factors(const MediumEstimate& medium) {
+/// Albedos as they will be once the brightest is brought down to `brightest`.
+std::vector<CurvedBodyFactor> body_factors(const MediumEstimate& medium, double brightest) {
     double largest = 0;
     for (const TwoExponentials& fit : medium.fit) largest = std::max(largest, fit.total());
-    const double scale = largest > kPlausibleAlbedo ? kPlausibleAlbedo / largest : 1.0;
+    const double scale = largest > brightest ? brightest / largest : 1.0;
     std::vector<CurvedBodyFactor> factors;
     for (const TwoExponentials& fit : medium.fit)
         factors.push_back(curved_body_factor(scale * fit.total()));
@@ -182,7 +182,7 @@ MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const M
             medium.fit = fit_ordered(histogram, exitance, fit_options);
         }
         if (!is_last) {
-            factors = body_factors(medium);
+            factors = body_factors(medium, options.is_level_known ? 1.0 : kPlausibleAlbedo);
             continue;
         }
         for (int c = 0; c < 3; ++c) {

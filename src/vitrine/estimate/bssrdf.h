@@ -50,6 +50,9 @@ struct BssrdfOptions {
     double ridge = 1e-4;          ///< Tikhonov weight of the piecewise profile
     bool use_shadows = true;      ///< the object's own cast shadows
     bool use_curved_body = true;  ///< optics/curved_body.h; false: the flat R_d, as published
+    /// The light is given in the picture's units, so that albedos are what they are. Else only
+    /// their ratios are known, and the brightest is taken for plausible at most (limit_albedo).
+    bool is_level_known = false;
     Transmittance transmittance = Transmittance::Auto;
     std::uint64_t seed = 1;  ///< of the choice of pixels
 };
