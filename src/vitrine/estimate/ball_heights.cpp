@@ -32,8 +32,8 @@ std::vector<Pair> pairs_of(const Relief& cluster) {
             const double apart = (balls[i].centre_px - balls[j].centre_px).head<2>().norm();
             if (apart >= reach) continue;
             const bool is_first = balls[i].centre_px.z() > balls[j].centre_px.z();
-            pairs.push_back({is_first ? i : j, is_first ? j : i,
-                             std::sqrt(reach * reach - apart * apart)});
+            pairs.push_back(
+                {is_first ? i : j, is_first ? j : i, std::sqrt(reach * reach - apart * apart)});
         }
     }
     return pairs;
@@ -56,7 +56,8 @@ class Heights {
         const LitRelief object(work_, samples_, observations_, options.eta, true);
         for (int c = 0; c < 3; ++c) {
             const double mean = y_.col(c).mean();
-            const bool is_dark = lights.kernel[static_cast<std::size_t>(c)].total() <= 0 || mean <= 0;
+            const bool is_dark =
+                lights.kernel[static_cast<std::size_t>(c)].total() <= 0 || mean <= 0;
             if (is_dark) continue;
             channels_.push_back(c);
             y_.col(c) /= mean;
@@ -85,8 +86,8 @@ class Heights {
         double sum = 0.5 * options_.looks * std::log(std::max(misfit, 1e-12));
         for (const Pair& pair : pairs_) {
             const double r = 0.5 * (balls[pair.front].radius_px + balls[pair.back].radius_px);
-            const double gap = (balls[pair.front].centre_px.z() - balls[pair.back].centre_px.z() -
-                                pair.rise) / r;
+            const double gap =
+                (balls[pair.front].centre_px.z() - balls[pair.back].centre_px.z() - pair.rise) / r;
             const double spread = gap < 0 ? options_.overlap_spread : options_.gap_spread;
             sum += 0.5 * gap * gap / (spread * spread);
         }
@@ -103,8 +104,8 @@ class Heights {
                 const std::size_t own = rise > 0 ? pair.back : pair.front;
                 if (own != group[next] || std::count(group.begin(), group.end(), other) > 0)
                     continue;
-                const double room = balls[pair.front].centre_px.z() -
-                                    balls[pair.back].centre_px.z() - pair.rise;
+                const double room =
+                    balls[pair.front].centre_px.z() - balls[pair.back].centre_px.z() - pair.rise;
                 if (room < 0.5 * std::abs(rise)) group.push_back(other);
             }
         }

@@ -64,7 +64,8 @@ std::size_t BallBounce::first_hit(const Vec3f& point, const Vec3f& direction, st
         const float along = to_centre.dot(direction);
         // A ball behind the point is not met, so an unseen ball does not hide its own patches.
         if (along <= 0) continue;
-        const float rest = ball.radius_px * ball.radius_px - to_centre.squaredNorm() + along * along;
+        const float rest =
+            ball.radius_px * ball.radius_px - to_centre.squaredNorm() + along * along;
         if (rest <= 0) continue;
         const float ahead = std::max(0.0f, along - std::sqrt(rest));
         if (ahead >= distance) continue;
@@ -119,8 +120,7 @@ BallBounce::View BallBounce::view_from(const SurfacePoints& points) const {
             [&](const Vec3f& ray, float cosine) {
                 view.sky.ambient[i] += cosine / all;
                 if (ray.y() < 0) {
-                    view.sky.below[i] +=
-                        cosine / all_below * facing_down(points.normal[i]);
+                    view.sky.below[i] += cosine / all_below * facing_down(points.normal[i]);
                 }
             });
     });
@@ -156,9 +156,8 @@ std::vector<Rgb> BallBounce::irradiance(const SurfacePoints& points,
     return result;
 }
 
-std::vector<Rgb> with_bounces(
-    const Relief& relief, const SurfacePoints& points,
-    const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct) {
+std::vector<Rgb> with_bounces(const Relief& relief, const SurfacePoints& points,
+                              const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct) {
     std::vector<Rgb> result = direct(points);
     if (!relief.is_cluster() || relief.ball_albedo.maxCoeff() <= 0) return result;
     const BallBounce bounce(relief);

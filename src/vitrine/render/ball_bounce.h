@@ -55,8 +55,7 @@ class BallBounce {
 
 /// Irradiance at the points by lights and, where Relief::ball_albedo says so, by other balls.
 /// @param direct the lights' alone, at any points
-std::vector<Rgb> with_bounces(
-    const Relief& relief, const SurfacePoints& points,
-    const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct);
+std::vector<Rgb> with_bounces(const Relief& relief, const SurfacePoints& points,
+                              const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct);
 
 }  // namespace vitrine
