@@ -53,7 +53,10 @@ LightSampler::LightSampler(std::vector<Light> lights, const Rgb& ambient_radianc
       tables_(lights_.size()),
       ambient_(ambient_radiance) {
     for (std::size_t i = 0; i < lights_.size(); ++i) {
-        if (const auto* disc = std::get_if<DiscLight>(&lights_[i])) discs_[i].emplace(*disc);
+        if (const auto* disc = std::get_if<DiscLight>(&lights_[i])) {
+            discs_[i].emplace(*disc);
+            lamps_.push_back(i);
+        }
         const auto* environment = std::get_if<EnvironmentLight>(&lights_[i]);
         if (!environment) continue;
         environments_.push_back(i);

@@ -57,6 +57,8 @@ class LightSampler {
         return discs_[light].has_value() || tables_[light];
     }
     bool can_be_hit(std::size_t light) const { return discs_[light].has_value(); }
+    /// Those for which `can_be_hit`.
+    const std::vector<std::size_t>& lamps() const { return lamps_; }
 
     /// Uniform environment beside the maps.
     const Rgb& ambient() const { return ambient_; }
@@ -90,7 +92,7 @@ class LightSampler {
 
     std::vector<Light> lights_;
     std::vector<std::optional<Disc>> discs_;  // per light, empty if no disc
-    std::vector<std::size_t> environments_;
+    std::vector<std::size_t> lamps_, environments_;
     std::vector<std::shared_ptr<const EnvironmentTable>> tables_;  // per light, null if no map
     Rgb ambient_ = Rgb::Zero();
 };

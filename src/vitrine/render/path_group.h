@@ -1,56 +1,74 @@
-// render/path_group.h: paths of neighbouring pixels, gathered and followed many together.
+// render/path_group.h: paths of a row of pixels, gathered and followed many together.
 #pragma once
 
-#include "render/path_tracer.h"
+#include "render/camera_rays.h"
 
 #include <vector>
 
 namespace vitrine {
 
-/// Gives every path that was added to `use(x, task, pair)`, in the order in which they came.
+/// Gives every path that was added to `use(x, wish, pair)`, in the order in which they came.
 template <typename Use>
 class PathGroup {
   public:
     /// @param tracers of which each path names one: they differ in their photons alone
-    PathGroup(std::span<const PathTracer> tracers, const Vec3f& origin, Use use)
-        : tracers_(tracers), origin_(origin), lists_(tracers.size()), use_(std::move(use)) {}
+    /// @param y row of the pixels
+    PathGroup(std::span<const PathTracer> tracers, const CameraRays& rays, const Vec3f& origin,
+              int y, Use use)
+        : tracers_(tracers),
+          rays_(rays),
+          origin_(origin),
+          y_(y),
+          lists_(tracers.size()),
+          use_(std::move(use)) {}
 
-    /// @param x what `use` is told of the path's pixel
-    void add(std::size_t tracer, int x, const PathTask& task) {
+    /// @param x of the path's pixel; @param sampler of stream_key(seed, x, y) and the sample's
+    /// index
+    void add(std::size_t tracer, int x, const PathSampler& sampler, const PathWish& wish) {
         List& list = lists_[tracer];
-        entries_.push_back({x, tracer, list.tasks.size()});
-        list.tasks.push_back(task);
-        if (entries_.size() >= kTogether) finish();
+        if (lists_.size() > 1) turns_.push_back(tracer);
+        list.columns.push_back(x);
+        list.tasks.push_back({{sampler, Vec3f::Zero()}, wish});
+        if (++count_ >= kTogether) finish();
     }
     /// Follows those that wait.
     void finish() {
         for (std::size_t t = 0; t < lists_.size(); ++t) {
             List& list = lists_[t];
-            list.pairs.resize(list.tasks.size());
-            tracers_[t].trace_both(origin_, list.tasks, list.pairs, workspace_);
+            rays_.aim(list.columns, y_, list.tasks);
+            if (list.pairs.size() < list.tasks.size()) list.pairs.resize(list.tasks.size());
+            tracers_[t].trace_both(origin_, list.tasks,
+                                   std::span(list.pairs).first(list.tasks.size()), workspace_);
+            list.next = 0;
         }
-        for (const Entry& entry : entries_) {
-            const List& list = lists_[entry.tracer];
-            use_(entry.x, list.tasks[entry.index], list.pairs[entry.index]);
+        for (std::size_t i = 0; i < count_; ++i) {
+            List& list = lists_[lists_.size() > 1 ? turns_[i] : 0];
+            const std::size_t k = list.next++;
+            use_(list.columns[k], list.tasks[k].wish, list.pairs[k]);
         }
-        for (List& list : lists_) list.tasks.clear();
-        entries_.clear();
+        for (List& list : lists_) {
+            list.tasks.clear();
+            list.columns.clear();
+        }
+        turns_.clear();
+        count_ = 0;
     }
 
   private:
     static constexpr std::size_t kTogether = 256;
-    struct Entry {
-        int x;
-        std::size_t tracer, index;
-    };
     struct List {
+        std::vector<int> columns;
         std::vector<PathTask> tasks;
         std::vector<PathPair> pairs;
+        std::size_t next = 0;  // to be given away
     };
     std::span<const PathTracer> tracers_;
+    const CameraRays& rays_;
     Vec3f origin_;
-    std::vector<Entry> entries_;
+    int y_;
     std::vector<List> lists_;
+    std::vector<std::size_t> turns_;  // tracer of each path, where there are several
+    std::size_t count_ = 0;
     PathTracer::Workspace workspace_;
     Use use_;
 };

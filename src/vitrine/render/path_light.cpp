@@ -14,8 +14,7 @@ float balance(float a, float b) { return a + b > 0 ? a / (a + b) : 0.0f; }
 void PathTracer::add_emission(const State& state, float distance, Sink sink) const {
     if (state.is_covered) return;
     const LightSampler& lights = scene_.lights();
-    for (std::size_t i = 0; i < lights.count(); ++i) {
-        if (!lights.can_be_hit(i)) continue;
+    for (const std::size_t i : lights.lamps()) {
         const auto hit = lights.hit(i, state.origin, state.direction, distance);
         if (!hit) continue;
         float weight = 1.0f;

@@ -13,7 +13,8 @@ std::size_t lane(T i) {
 /// As the other `sample_light`, of lights of any kind.
 void sample_light(PlainLanes& lanes, const LightSampler& lights, std::size_t light, int count) {
     for (int i = 0; i < count; ++i) {
-        const auto s = lights.sample(light, lanes.origin.at(i), {lanes.u[lane(i)], lanes.v[lane(i)]});
+        const auto s =
+            lights.sample(light, lanes.origin.at(i), {lanes.u[lane(i)], lanes.v[lane(i)]});
         lanes.lit[lane(i)] = s ? 1.0f : 0.0f;
         if (!s) continue;
         lanes.to_light.set(i, s->direction);
@@ -57,26 +58,25 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
         const Hit& hit = *hits[lane(i)].hit;
         const PartShape& shape = scene_.shape(hit.part);
         const Triangle& triangle = shape.triangles[hit.triangle];
-        for (int k = 0; k < 3; ++k) {
-            lanes.corner[k].set(i, shape.vertices[triangle[k]]);
-            lanes.corner_normal[k].set(i, shape.normals ? shape.normals[triangle[k]] : hit.normal);
+        for (int k = 0; k < 3; ++k) lanes.corner[k].set(i, shape.vertices[triangle[k]]);
+        for (int k = 0; shape.normals && k < 3; ++k) {
+            lanes.corner_normal[k].set(i, shape.normals[triangle[k]]);
         }
         lanes.weight1[lane(i)] = hit.barycentric.x();
         lanes.weight2[lane(i)] = hit.barycentric.y();
         lanes.is_rounded[lane(i)] = shape.normals ? 1 : 0;
         lanes.facet.set(i, hit.normal);
         lanes.direction.set(i, state.direction);
-        lanes.albedo.set(i, shape.has_one_albedo ? shape.albedo
-                                                 : scene_.diffuse_albedo(hit.part, hit));
+        lanes.albedo.set(
+            i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(hit.part, hit));
         lanes.throughput.set(i, state.throughput);
         const PathSampler& sampler = wave.task(state).sample.sampler;
         lanes.random.stream[lane(i)] = sampler.mixed_stream();
         lanes.random.index[lane(i)] = sampler.index();
         lanes.random.depth[lane(i)] = static_cast<std::uint32_t>(state.depth);
-        lanes.can_scatter[lane(i)] = !options_.direct_light_only &&
-                                             state.diffuse_bounces < options_.max_diffuse_bounces
-                                         ? 1
-                                         : 0;
+        lanes.can_scatter[lane(i)] =
+            !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces ? 1
+                                                                                                : 0;
         if (!state.is_layer_fixed) {
             state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
         }
@@ -176,7 +176,8 @@ void PathTracer::scatter(Wave& wave, std::span<const PlainHit> hits,
         // Copied before it is written to: what was just written would have to be waited for.
         State& state = wave.next.emplace_back(*hits[lane(i)].state);
         state.throughput = lanes.throughput.at(i).array();
-        const BsdfSample scattered{lanes.scattered.at(i), Rgb::Ones(), lanes.scattered_pdf[lane(i)]};
+        const BsdfSample scattered{lanes.scattered.at(i), Rgb::Ones(),
+                                   lanes.scattered_pdf[lane(i)]};
         const PathSampler& sampler = wave.task(state).sample.sampler;
         if (!send_on(state, scattered, scattered.wi, lanes.origin.at(i), sampler)) {
             wave.next.pop_back();

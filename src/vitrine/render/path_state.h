@@ -26,22 +26,22 @@ struct PathTracer::State {
     std::uint32_t path = 0;  // whose task and result
     Vec3f origin, direction;
     Rgb throughput = Rgb::Ones();
+    Vec3f receiver = Vec3f::Zero();
+    float pdf = 0;  // of `direction` at the last receiver; 0 for single directions
     Media media;
-    int depth = 0;  // vertices so far
-    int diffuse_bounces = 0;
-    int specular_bounces = 0;
+    std::int16_t depth = 0;  // vertices so far
+    std::int16_t diffuse_bounces = 0;
+    std::int16_t specular_bounces = 0;
+    std::uint8_t views = kVirtualParts;  // scenes whose path this is
+    Layer layer = Layer::Shadow;
     bool has_receiver = false;      // left a surface that photons are stored on
     bool is_first_receiver = true;  // the next receiver is the one seen
     /// Light met now is known from the photons of the last receiver.
     bool is_covered = false;
-    Layer layer = Layer::Shadow;
     bool is_layer_fixed = false;      // seen by way of a reflection or refraction
     bool is_from_first = false;       // left the surface seen by its diffuse lobe
     bool is_diffuse_segment = false;  // straight from a receiver's diffuse lobe
     bool is_soft = false;             // what comes now is soft light of the surface seen
-    float pdf = 0;  // of `direction` at the last receiver; 0 for single directions
-    Vec3f receiver = Vec3f::Zero();
-    std::uint32_t views = kVirtualParts;  // scenes whose path this is
 };
 
 /// Where the contributions of a path go: all to the first result until the two scenes differ.
@@ -82,8 +82,9 @@ struct PathTracer::Sink {
 /// Light that arrives if nothing is in its way.
 struct PathTracer::ShadowRay {
     Rgb light;
-    std::uint32_t path, path_views;
-    std::uint32_t views;  // scenes, of those of the path, in which the light is there
+    std::uint32_t path;
+    std::uint8_t path_views;
+    std::uint8_t views;  // scenes, of those of the path, in which the light is there
     Layer layer;
     bool is_soft;
 };
@@ -133,7 +134,8 @@ inline void PathTracer::Wave::add_shadow(const State& state, std::uint32_t views
                                          const Rgb& light, Ray ray) {
     ray.mask = mask_of(views);
     shadow_rays.push_back(ray);
-    shadows.push_back({light, state.path, state.views, views, layer, state.is_soft});
+    shadows.push_back(
+        {light, state.path, state.views, static_cast<std::uint8_t>(views), layer, state.is_soft});
 }
 
 }  // namespace vitrine

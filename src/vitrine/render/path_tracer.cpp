@@ -11,13 +11,6 @@ constexpr float kMinSplitShare = 0.01f;
 
 }  // namespace
 
-CameraRays::CameraRays(const Camera& camera) {
-    const Mat3 world_from_camera = camera.cam_from_world.rotation.transpose();
-    right_ = (world_from_camera.col(0) / camera.fx).cast<float>();
-    down_ = (world_from_camera.col(1) / camera.fy).cast<float>();
-    corner_ = (world_from_camera * camera.ray_in_camera(0, 0)).cast<float>();
-}
-
 PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
                        const TranslucentLight* translucent)
     : scene_(scene),

@@ -18,7 +18,7 @@
 namespace vitrine {
 
 /// What a contribution is due to; the layers of a difference.
-enum class Layer {
+enum class Layer : std::uint8_t {
     Shadow,      ///< light and environment straight onto the surface seen: changes by occlusion
     Caustics,    ///< photons on the surface seen
     Reflection,  ///< all that is seen in a mirror, a glossy lobe or a glass surface
@@ -74,33 +74,11 @@ class PathPair {
     bool is_touched_ = false;
 };
 
-/// Directions of a camera's rays.
-class CameraRays {
-  public:
-    explicit CameraRays(const Camera& camera);
-    /// Unit, in the world; see `Camera::ray_in_world`.
-    Vec3f through(float u, float v) const {
-        return (corner_ + u * right_ + v * down_).normalized();
-    }
-
-  private:
-    Vec3f corner_, right_, down_;
-};
-
-/// Sample `index` of a pixel: a ray through a place in its square, and the path's random numbers.
-/// Renderers that share a seed share them.
+/// A ray from the camera and the path's random numbers.
 struct CameraSample {
     PathSampler sampler;
     Vec3f direction;
 };
-/// @param stream of the pixel: stream_key(seed, x, y)
-inline CameraSample camera_sample(const CameraRays& rays, std::uint64_t stream, int x, int y,
-                                  int index) {
-    const PathSampler sampler(stream, static_cast<std::uint32_t>(index));
-    const Vec2f jitter = sampler.pair(0, 0);
-    return {sampler, rays.through(static_cast<float>(x) + (jitter.x() - 0.5f),
-                                  static_cast<float>(y) + (jitter.y() - 0.5f))};
-}
 
 /// What one path is asked for.
 struct PathWish {

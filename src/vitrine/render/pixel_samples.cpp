@@ -64,9 +64,9 @@ PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMa
 
 void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>& soft_target,
                                int light_samples, Image<PixelSums>& sums) const {
-    PathGroup group(tracers_, origin_, [&](int x, const PathTask& task, const PathPair& pair) {
-        add(pair, task.wish, sums(x, y));
-    });
+    PathGroup group(
+        tracers_, rays_, origin_, y,
+        [&](int x, const PathWish& wish, const PathPair& pair) { add(pair, wish, sums(x, y)); });
     for (int x = 0; x < sums.width(); ++x) {
         const PixelSums& pixel = sums(x, y);
         const std::uint64_t stream = stream_key(seed_, unsigned(x), unsigned(y));
@@ -76,9 +76,8 @@ void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>
             // Neighbours begin with different passes: soft light is averaged over them.
             const auto turn = static_cast<std::size_t>(k + x + 2 * y);
             const bool finds_soft = soft_left-- > 0;
-            group.add(turn % tracers_.size(), x,
-                      {camera_sample(rays_, stream, x, y, k),
-                       {finds_soft, finds_soft ? 1 : light_samples}});
+            group.add(turn % tracers_.size(), x, PathSampler(stream, static_cast<std::uint32_t>(k)),
+                      {finds_soft, finds_soft ? 1 : light_samples});
         }
     }
     group.finish();

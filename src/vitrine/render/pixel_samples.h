@@ -2,7 +2,7 @@
 // and what they sum to.
 #pragma once
 
-#include "render/path_tracer.h"
+#include "render/camera_rays.h"
 #include "render/soft_light.h"
 
 namespace vitrine {

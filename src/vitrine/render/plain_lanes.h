@@ -64,7 +64,7 @@ struct PlainLanes {
     Lanes3 to_light, light;
     Lane<float> distance, pdf;
     Lane<float> scale;  ///< of what the light brings
-    Lane<float> lit;  ///< above 0: may arrive
+    Lane<float> lit;    ///< above 0: may arrive
     // The ray that goes on.
     Lanes3 scattered;
     Lane<float> scattered_pdf;

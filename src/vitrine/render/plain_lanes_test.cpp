@@ -139,8 +139,7 @@ TEST(PlainLanes, LightsAreThoseOfTheSampler) {
             if (!is_lit) continue;
             ++lit;
             const float lobe = cosine / kPif;
-            const float weight =
-                s->pdf > 0 && i % 3 != 0 ? s->pdf / (s->pdf + lobe) : 1.0f;
+            const float weight = s->pdf > 0 && i % 3 != 0 ? s->pdf / (s->pdf + lobe) : 1.0f;
             const Rgb expected = Rgb(0.9f, 0.8f, 0.7f) * Rgb(0.6f, 0.5f, 0.4f) / kPif * weight *
                                  s->radiance_over_pdf * (0.5f * cosine);
             EXPECT_TRUE(lanes.light.at(i).isApprox(expected.matrix(), 1e-6f));

@@ -121,9 +121,9 @@ class ImageSampler {
     template <typename Target, typename SoftTarget>
     void add_samples(int y, const Target& target, const SoftTarget& soft_target,
                      Image<PixelSum>& sums) const {
-        PathGroup group(std::span(&tracer_, 1), origin_,
-                        [&](int x, const PathTask& task, const PathPair& pair) {
-                            add(pair.with(), task.wish, soft_target(x) < 0, sums(x, y));
+        PathGroup group(std::span(&tracer_, 1), rays_, origin_, y,
+                        [&](int x, const PathWish& wish, const PathPair& pair) {
+                            add(pair.with(), wish, soft_target(x) < 0, sums(x, y));
                         });
         for (int x = 0; x < sums.width(); ++x) {
             const PixelSum& pixel = sums(x, y);
@@ -131,9 +131,8 @@ class ImageSampler {
             int soft_left = soft_target(x) - pixel.soft_count;
             const int end = target(x);
             for (int k = pixel.count; k < end; ++k) {
-                group.add(0, x,
-                          {camera_sample(rays_, stream, x, y, k),
-                           {soft_target(x) < 0 || soft_left-- > 0, 1}});
+                group.add(0, x, PathSampler(stream, static_cast<std::uint32_t>(k)),
+                          {soft_target(x) < 0 || soft_left-- > 0, 1});
             }
         }
         group.finish();

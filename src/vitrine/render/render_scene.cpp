@@ -86,12 +86,12 @@ void Media::enter(int part, const std::vector<int>& rank) {
     for (; slot > 0 && rank_of(parts_[slot - 1]) > rank_of(part); --slot) {
         parts_[slot] = parts_[slot - 1];
     }
-    parts_[slot] = part;
+    parts_[slot] = static_cast<std::int16_t>(part);
 }
 
 void Media::leave(int part) {
-    int* const end = std::remove(parts_, parts_ + count_, part);
-    count_ = static_cast<int>(end - parts_);
+    const auto end = std::remove(parts_, parts_ + count_, static_cast<std::int16_t>(part));
+    count_ = static_cast<std::int16_t>(end - parts_);
 }
 
 RenderScene::RenderScene(Scene scene) : scene_(std::move(scene)) {
@@ -121,6 +121,7 @@ RenderScene::RenderScene(const RenderScene& world, std::vector<Part> virtual_par
 }
 
 void RenderScene::measure_parts() {
+    VITRINE_CHECK_LT(scene_.parts.size(), std::size_t{1} << 15);  // as numbered by `Media`
     const Box3 box = bounds(scene_);
     if (!box.is_empty()) {
         bounding_sphere_ = {box.centre().cast<float>(), static_cast<float>(box.radius())};

@@ -30,9 +30,9 @@ class Media {
     void leave(int part);
 
   private:
-    static constexpr int kCapacity = 6;  // more bodies inside each other are not told apart
-    int parts_[kCapacity] = {};          // sorted by rank
-    int count_ = 0;
+    static constexpr int kCapacity = 6;   // more bodies inside each other are not told apart
+    std::int16_t parts_[kCapacity] = {};  // sorted by rank
+    std::int16_t count_ = 0;
 };
 
 /// A surface point that a ray has met, seen from where the ray came.
