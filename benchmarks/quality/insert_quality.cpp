@@ -44,13 +44,15 @@ struct RegionError {
     double error = 0;
     double floor = 0;  ///< the truth's noise far from any change
     double noise = 0;  ///< that of both pictures within the region
+    double power = 0;  ///< of the true change
     std::size_t count = 0;
 };
 
 RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double noise_rms,
                          const ImageRgb& noise_variance, const Mask& inside) {
-    double difference = 0, power = 0, noise = 0;
+    double difference = 0, noise = 0;
     RegionError result;
+    double& power = result.power;
     for (std::size_t i = 0; i < truth.size(); ++i) {
         if (inside[i] < 128) continue;
         difference += (estimate[i] - truth[i]).square().sum();
@@ -66,16 +68,24 @@ RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double
     return result;
 }
 
-/// Root mean square of the true difference where the estimate says that nothing changed.
-double noise_rms(const ImageRgb& truth, const ImageRgb& estimate, double level) {
-    double sum = 0;
+/// Where the estimate says that nothing changed: root mean square of the true difference, which is
+/// the truth's noise, and what neighbouring pixels say of that noise.
+struct FarNoise {
+    double rms = 0, by_neighbours = 0;
+};
+FarNoise far_noise(const ImageRgb& truth, const ImageRgb& raw_truth, const ImageRgb& estimate,
+                   double level) {
+    const ImageRgb variance = blurred_noise_variance(raw_truth);
+    double sum = 0, predicted = 0;
     std::size_t count = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
         if (estimate[i].abs().maxCoeff() > 0.002 * level) continue;
         sum += truth[i].square().sum();
+        predicted += variance[i].sum();
         count += 3;
     }
-    return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+    const double n = std::max<double>(1, static_cast<double>(count));
+    return {std::sqrt(sum / n), std::sqrt(predicted / n)};
 }
 
 /// One frame: pictures of the change and the regions it falls into.
@@ -139,15 +149,25 @@ Sum sum_of(const Mask& region, const Term& term) {
     return sum;
 }
 
+/// Per region: the error, the truth's noise far off and how far the error is above it, and the same
+/// with the truth's noise in the region: of both pictures, by their neighbours, less ours.
+/// @param second another picture of ours, whose difference tells our noise; null: not known, left
+/// in
 void print_errors(const TrueFrame& frame, const char* name, const ImageRgb& d, double noise,
-                  const ImageRgb& noise_variance) {
-    std::printf("%s %s: error (floor far off, noise in place)", frame.camera.id.c_str(), name);
+                  const ImageRgb& noise_variance, const ImageRgb* second) {
+    std::printf("%s %s: error - floor far off = above it; - truth's noise in place%s = above it\n",
+                frame.camera.id.c_str(), name, second ? "" : " (with ours)");
     for (int k = 0; k < 4; ++k) {
-        const RegionError e =
-            region_error(frame.d_true, d, noise, noise_variance, frame.regions[k]);
-        std::printf("  %s %.3f (%.3f, %.3f)", kRegionNames[k], e.error, e.floor, e.noise);
+        const Mask& region = frame.regions[k];
+        const RegionError e = region_error(frame.d_true, d, noise, noise_variance, region);
+        double ours = 0;
+        for (std::size_t i = 0; second && e.power > 0 && i < region.size(); ++i) {
+            if (region[i] > 127) ours += 0.5 * (d[i] - (*second)[i]).square().sum() / e.power;
+        }
+        const double in_place = std::sqrt(std::max(0.0, e.noise * e.noise - ours));
+        std::printf("    %-8s %.3f - %.3f = %.3f; - %.3f = %.3f\n", kRegionNames[k], e.error,
+                    e.floor, e.error - e.floor, in_place, e.error - in_place);
     }
-    std::printf("\n");
 }
 
 /// Two pictures of ours with different random numbers, and one of paths alone, tell whose the error
@@ -326,9 +346,14 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
         ImageRgb raw_error = raw_difference(image.with, image.without, top);
         for (std::size_t i = 0; i < raw_error.size(); ++i) raw_error[i] -= frame.raw_true[i];
         const ImageRgb noise_variance = blurred_noise_variance(raw_error);
-        const double noise = noise_rms(frame.d_true, d_render, frame.level);
-        print_errors(frame, "rendered ", d_render, noise, noise_variance);
-        print_errors(frame, "composite", d_composite, noise, noise_variance);
+        const FarNoise noise = far_noise(frame.d_true, frame.raw_true, d_render, frame.level);
+        std::optional<ImageRgb> d_second;
+        if (second) d_second = change_of(second->render(camera));
+        const ImageRgb* other = d_second ? &*d_second : nullptr;
+        print_errors(frame, "rendered", d_render, noise.rms, noise_variance, other);
+        print_errors(frame, "composite", d_composite, noise.rms, noise_variance, other);
+        std::printf("%s truth's noise far off: by neighbours %.2f of what it is\n",
+                    camera.id.c_str(), noise.by_neighbours / std::max(1e-30, noise.rms));
         if (second) {
             std::optional<ImageRgb> paths;
             std::array<int, 4> window = {0, 0, camera.width, camera.height};
@@ -345,8 +370,7 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
                 paths = change_by_paths(truth, part, camera, options.path_samples, window, image,
                                         frame, top);
             }
-            print_shares(frame, d_render, change_of(second->render(camera)),
-                         paths ? &*paths : nullptr, in_window);
+            print_shares(frame, d_render, *d_second, paths ? &*paths : nullptr, in_window);
         }
         if (std::holds_alternative<Dielectric>(part.material)) {
             print_glints(frame, renderer.scene(), image, d_render, noise_variance, top);

@@ -5,8 +5,8 @@
 
 namespace vitrine {
 
-/// Prints, per frame and region, the error, the truth's noise far off and in place, our own noise,
-/// and what is left against paths alone.
+/// Prints, per frame and region, the error and how far it is above the truth's noise, far off and
+/// in place, our own noise, and what is left against paths alone.
 void compare_insertion(const RenderQualityOptions& options, const TruthScene& truth);
 
 }  // namespace vitrine

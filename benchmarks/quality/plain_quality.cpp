@@ -43,6 +43,7 @@ Mask all_special(const fs::path& folder, const std::string& frame, const Camera&
 struct RelativeError {
     double mean = 0, median = 0, bias = 0;
     double noise = 0;   ///< mean of what pixel noise alone makes of it, of both pictures
+    double even = 0;    ///< root mean square of what is left without the noise of either picture
     double ours = 0;    ///< of ours alone, by the spread of its paths (its sharp light)
     double coarse = 0;  ///< of means over 8 x 8 pixels, an eighth of whose noise is left
     std::size_t count = 0;
@@ -96,7 +97,9 @@ RelativeError relative_error(const RenderedImage& image, const ImageRgb& referen
             // What is smooth in the error drops out, the noise of five pixels is left.
             const double around =
                 (error(x - 1, y) + error(x + 1, y) + error(x, y - 1) + error(x, y + 1)) / 4;
-            result.noise += std::abs(error(x, y) - around) / std::sqrt(1.25) / level;
+            const double noise = (error(x, y) - around) / std::sqrt(1.25) / level;
+            result.noise += std::abs(noise);
+            result.even += errors.back() * errors.back() - noise * noise;
             ++inner;
         }
     }
@@ -109,6 +112,7 @@ RelativeError relative_error(const RenderedImage& image, const ImageRgb& referen
     result.bias /= n;
     result.ours /= n;
     result.noise /= std::max(1.0, static_cast<double>(inner));
+    result.even = std::sqrt(std::max(0.0, result.even) / std::max(1.0, double(inner)));
     return result;
 }
 
@@ -158,9 +162,10 @@ void compare_plain(const RenderQualityOptions& options, const TruthScene& truth,
         const RelativeError e = relative_error(image, reference, plain);
         std::printf(
             "%s plain: mean relative error %.4f (median %.4f; pixel noise alone %.4f, ours alone "
-            "%.4f; means of 8 x 8 pixels %.4f) bias %+.4f (%zu px)  caustic flux %.4f correlation "
+            "%.4f; rms without pixel noise %.4f; means of 8 x 8 pixels %.4f) bias %+.4f (%zu px)  "
+            "caustic flux %.4f correlation "
             "%.4f (%zu px)  %.1f s\n",
-            camera.id.c_str(), e.mean, e.median, e.noise, e.ours, e.coarse, e.bias, e.count,
+            camera.id.c_str(), e.mean, e.median, e.noise, e.ours, e.even, e.coarse, e.bias, e.count,
             flux / std::max(1e-30, flux_true), correlation, bright, seconds);
         if (!options.out.empty()) {
             write_side_by_side(fs::path(options.out) / (camera.id + "_plain.png"),

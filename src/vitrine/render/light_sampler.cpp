@@ -156,23 +156,6 @@ float LightSampler::pdf(std::size_t light, const Vec3f&, const Vec3f& direction,
     return 0.0f;
 }
 
-std::optional<LightSampler::Hit> LightSampler::hit(std::size_t light, const Vec3f& origin,
-                                                   const Vec3f& direction,
-                                                   float max_distance) const {
-    const auto& disc = discs_[light];
-    if (!disc) return std::nullopt;
-    const Vec3f& normal = disc->frame.normal;
-    const float slope = direction.dot(normal);
-    if (slope >= 0) return std::nullopt;
-    const Vec3f to_centre = disc->position - origin;
-    const float t = to_centre.dot(normal) / slope;
-    if (t <= 0 || t >= max_distance) return std::nullopt;
-    if ((t * direction - to_centre).squaredNorm() > disc->radius * disc->radius) {
-        return std::nullopt;
-    }
-    return Hit{light, t, disc->radiance};
-}
-
 EmittedRay LightSampler::emit(std::size_t light, const Sphere& target, const Vec2f& u_direction,
                               const Vec2f& u_position, const Sphere& scene) const {
     EmittedRay ray;

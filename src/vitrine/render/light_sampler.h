@@ -51,7 +51,20 @@ class LightSampler {
     };
     /// The discs that a ray meets before `max_distance`, on their bright side, one call per light.
     std::optional<Hit> hit(std::size_t light, const Vec3f& origin, const Vec3f& direction,
-                           float max_distance) const;
+                           float max_distance) const {
+        const auto& disc = discs_[light];
+        if (!disc) return std::nullopt;
+        const Vec3f& normal = disc->frame.normal;
+        const float slope = direction.dot(normal);
+        if (slope >= 0) return std::nullopt;
+        const Vec3f to_centre = disc->position - origin;
+        const float t = to_centre.dot(normal) / slope;
+        if (t <= 0 || t >= max_distance) return std::nullopt;
+        if ((t * direction - to_centre).squaredNorm() > disc->radius * disc->radius) {
+            return std::nullopt;
+        }
+        return Hit{light, t, disc->radiance};
+    }
     /// Whether `sample` and `emit` use their position: lights with size and environment maps.
     bool needs_position(std::size_t light) const {
         return discs_[light].has_value() || tables_[light];

@@ -51,6 +51,14 @@ struct PathResult {
     SoftLight soft;
     int first_part = -1;  ///< met by the camera ray itself; -1: none
     PathResult() { layers.fill(Rgb::Zero()); }
+    /// Without any light; where soft light was found stays, and counts no longer.
+    void clear() {
+        layers.fill(Rgb::Zero());
+        soft.is_present = false;
+        soft.shadow = soft.diffuse = Rgb::Zero();
+        soft.hit_distance = 0;
+        first_part = -1;
+    }
     Rgb sharp() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
     Rgb total() const { return sharp() + soft.shadow + soft.diffuse; }
 };
@@ -67,11 +75,11 @@ class PathPair {
     friend class PathTracer;
     /// As new; the second result is filled where they part.
     void clear() {
-        with_ = PathResult();
+        with_.clear();
         is_touched_ = false;
     }
-    PathResult with_, without_;  // the second counts from where they part
     bool is_touched_ = false;
+    PathResult with_, without_;  // the second counts from where they part
 };
 
 /// A ray from the camera and the path's random numbers.

@@ -69,14 +69,14 @@ void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>
         [&](int x, const PathWish& wish, const PathPair& pair) { add(pair, wish, sums(x, y)); });
     for (int x = 0; x < sums.width(); ++x) {
         const PixelSums& pixel = sums(x, y);
-        const std::uint64_t stream = stream_key(seed_, unsigned(x), unsigned(y));
+        const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
         int soft_left = soft_target(x, y) - pixel.soft_count;
         const int end = std::max(target(x, y), soft_target(x, y));
         for (int k = pixel.count; k < end; ++k) {
             // Neighbours begin with different passes: soft light is averaged over them.
             const auto turn = static_cast<std::size_t>(k + x + 2 * y);
             const bool finds_soft = soft_left-- > 0;
-            group.add(turn % tracers_.size(), x, PathSampler(stream, static_cast<std::uint32_t>(k)),
+            group.add(turn % tracers_.size(), x, sampler.at(static_cast<std::uint32_t>(k)),
                       {finds_soft, finds_soft ? 1 : light_samples});
         }
     }

@@ -127,11 +127,11 @@ class ImageSampler {
                         });
         for (int x = 0; x < sums.width(); ++x) {
             const PixelSum& pixel = sums(x, y);
-            const std::uint64_t stream = stream_key(seed_, unsigned(x), unsigned(y));
+            const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
             int soft_left = soft_target(x) - pixel.soft_count;
             const int end = target(x);
             for (int k = pixel.count; k < end; ++k) {
-                group.add(0, x, PathSampler(stream, static_cast<std::uint32_t>(k)),
+                group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)),
                           {soft_target(x) < 0 || soft_left-- > 0, 1});
             }
         }

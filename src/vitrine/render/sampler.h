@@ -21,6 +21,12 @@ class PathSampler {
     PathSampler(std::uint64_t stream, std::uint32_t index)
         : mixed_stream_(mix_bits(stream)), index_(index) {}
 
+    /// Of another sample of the same stream.
+    PathSampler at(std::uint32_t index) const {
+        PathSampler other = *this;
+        other.index_ = index;
+        return other;
+    }
     /// Pair for use `purpose` at vertex `depth`; stratified over `index` for the first vertices.
     Vec2f pair(int depth, int purpose) const {
         const std::uint64_t key = key_of(depth, purpose);
@@ -36,9 +42,8 @@ class PathSampler {
     /// Pair `k` of `count` that this sample takes instead of one: all samples that take as many go
     /// through the sequence together.
     Vec2f pair(int depth, int purpose, int count, int k) const {
-        PathSampler part = *this;
-        part.index_ = index_ * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(k);
-        return part.pair(depth, purpose);
+        return at(index_ * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(k))
+            .pair(depth, purpose);
     }
     /// The first of the pair.
     float number(int depth, int purpose) const {
