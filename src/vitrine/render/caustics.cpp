@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "render/interface.h"
 #include "render/photon_targets.h"
+#include "render/plain_lanes.h"
 #include "render/sampler.h"
 
 #include <span>
@@ -14,6 +15,9 @@ namespace {
 constexpr float kFaintBranchBoost = 4.0f;
 /// The share below which a branch is left to chance at all.
 constexpr float kSurePower = 0.25f;
+
+/// Random numbers of a vertex for its interface; those for scattering follow.
+constexpr int kInterfaceUse = 2;
 
 /// One ray under way through smooth and glossy parts.
 struct Flight {
@@ -33,6 +37,7 @@ struct Group {
     std::vector<std::uint8_t> is_touched;  ///< met a virtual part
     std::vector<Photon> arrivals;
     std::vector<std::uint32_t> slots;  ///< whose arrival each is
+    PlainLanes lanes = {};
 };
 
 class Tracer {
@@ -50,12 +55,9 @@ class Tracer {
         std::vector<Flight> flights, next, faint;
         std::vector<Ray> rays;
         std::vector<Hit> hits;
-        for (std::uint32_t slot = 0; slot < group.indices.size(); ++slot) {
-            ++balance.shot;
-            Flight flight = emit(target, group.indices[slot]);
-            flight.slot = slot;
-            if (flight.initial > 0) flights.push_back(flight);
-        }
+        PlainLanes& lanes = group.lanes;
+        emit(target, group.indices, flights);
+        balance.shot += group.indices.size();
         for (int generation = 0; !flights.empty(); ++generation) {
             rays.clear();
             for (const Flight& f : flights) {
@@ -63,18 +65,22 @@ class Tracer {
             }
             hits.resize(rays.size());
             closest(generation, rays, hits);
+            for (const Hit& hit : hits) scene_.prefetch_triangle(hit);
+            for (const Hit& hit : hits) scene_.prefetch_vertices(hit);
             next.clear();
             faint.clear();
             for (std::size_t i = 0; i < flights.size(); ++i) {
-                Flight& flight = flights[i];
+                if (i % kLanes == 0) look_ahead(target, group, flights, hits, i, lanes);
+                // Copied before it is written to: what was just written would have to be waited
+                // for.
+                Flight& flight = next.emplace_back(flights[i]);
                 if (hits[i].is_hit() && scene_.is_virtual(hits[i].part)) {
                     group.is_touched[flight.slot] = 1;
                 }
-                if (!goes_on(target, flight, hits[i], balance)) continue;
-                const PathSampler sampler(target.key,
-                                          static_cast<std::uint32_t>(group.indices[flight.slot]));
-                if (step(flight, hits[i], sampler, faint, group, view, balance)) {
-                    next.push_back(flight);
+                if (!goes_on(target, flight, hits[i], balance) ||
+                    !step(flight, hits[i], target, lanes, i % kLanes, faint, group, view,
+                          balance)) {
+                    next.pop_back();
                 }
             }
             // The faint branches of neighbours are neighbours too.
@@ -95,19 +101,72 @@ class Tracer {
         for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = scene_.closest(rays[i]);
     }
 
-    Flight emit(const PhotonTarget& target, std::uint64_t index) const {
-        const PathSampler sampler(target.key, static_cast<std::uint32_t>(index));
-        const Vec2f on_light = scene_.lights().needs_position(target.light)
-                                   ? sampler.further_pair(0)
-                                   : Vec2f(0.5f, 0.5f);
-        const EmittedRay emitted = scene_.lights().emit(
-            target.light, target.sphere, sampler.pair(0, 0), on_light, scene_.bounding_sphere());
-        Flight flight;
-        flight.origin = emitted.origin;
-        flight.direction = emitted.direction;
-        flight.power = emitted.power / static_cast<float>(target.count);
-        flight.initial = flight.power.maxCoeff();
-        return flight;
+    /// What flights from `begin` on meet, and the random numbers that an interface takes.
+    void look_ahead(const PhotonTarget& target, const Group& group,
+                    const std::vector<Flight>& flights, const std::vector<Hit>& hits,
+                    std::size_t begin, PlainLanes& lanes) const {
+        const std::size_t count = std::min<std::size_t>(kLanes, flights.size() - begin);
+        lanes.random.stream.fill(PathSampler(target.key, 0).mixed_stream());
+        lanes.random.use.fill(kInterfaceUse);
+        lanes.random.of.fill(1);
+        for (std::size_t i = 0; i < count; ++i) {
+            const Flight& flight = flights[begin + i];
+            const Hit& hit = hits[begin + i];
+            lanes.random.index[i] = static_cast<std::uint32_t>(group.indices[flight.slot]);
+            lanes.random.depth[i] = static_cast<std::uint32_t>(flight.depth);
+            if (!hit.is_hit()) continue;
+            set_hit(lanes, static_cast<int>(i), scene_.shape(hit.part), hit, flight.direction);
+        }
+        find_surfaces(lanes, static_cast<int>(count));
+        random_pairs(lanes.random, 0, lanes.u, lanes.v, static_cast<int>(count));
+    }
+
+    static ShadingPoint point_of(const Hit& hit, const PlainLanes& lanes, std::size_t lane) {
+        const auto i = static_cast<int>(lane);
+        return {hit.part,
+                hit.distance,
+                lanes.position.at(i),
+                lanes.geometric.at(i),
+                lanes.shading.at(i),
+                lanes.position.at(i),
+                lanes.side[lane] > 0};
+    }
+
+    /// Flights from the light, of those photons that carry something.
+    void emit(const PhotonTarget& target, std::span<const std::uint64_t> indices,
+              std::vector<Flight>& flights) const {
+        const LightSampler& lights = scene_.lights();
+        const bool has_size = lights.needs_position(target.light);
+        const PathSampler first(target.key, 0);
+        RandomLanes random;
+        random.stream.fill(first.mixed_stream());
+        random.depth.fill(0);
+        random.use.fill(0);
+        random.of.fill(1);
+        Lane<float> u, v;
+        flights.reserve(indices.size());
+        for (std::size_t begin = 0; begin < indices.size(); begin += kLanes) {
+            const std::size_t count = std::min<std::size_t>(kLanes, indices.size() - begin);
+            for (std::size_t i = 0; i < count; ++i) {
+                random.index[i] = static_cast<std::uint32_t>(indices[begin + i]);
+            }
+            random_pairs(random, 0, u, v, static_cast<int>(count));
+            for (std::size_t i = 0; i < count; ++i) {
+                const Vec2f on_light =
+                    has_size ? first.at(random.index[i]).further_pair(0) : Vec2f(0.5f, 0.5f);
+                const EmittedRay emitted = lights.emit(target.light, target.sphere, {u[i], v[i]},
+                                                       on_light, scene_.bounding_sphere());
+                const Rgb power = emitted.power / static_cast<float>(target.count);
+                const float initial = power.maxCoeff();
+                if (!(initial > 0)) continue;
+                Flight& flight = flights.emplace_back();
+                flight.origin = emitted.origin;
+                flight.direction = emitted.direction;
+                flight.power = power;
+                flight.initial = initial;
+                flight.slot = static_cast<std::uint32_t>(begin + i);
+            }
+        }
     }
 
     /// False when nothing that counts was met.
@@ -137,14 +196,17 @@ class Tracer {
     }
 
     /// One surface; false when the flight ends.
-    bool step(Flight& flight, const Hit& hit, const PathSampler& sampler,
-              std::vector<Flight>& pending, Group& group, std::uint32_t view,
+    /// @param lane of the flight in `lanes`
+    bool step(Flight& flight, const Hit& hit, const PhotonTarget& target, const PlainLanes& lanes,
+              std::size_t lane, std::vector<Flight>& pending, Group& group, std::uint32_t view,
               PhotonBalance& balance) const {
-        const ShadingPoint point = scene_.surface(hit, flight.direction);
-        absorb(flight, scene_.transmittance(flight.media, hit.distance), balance);
+        const ShadingPoint point = point_of(hit, lanes, lane);
+        if (flight.media.current() != Media::kNone) {
+            absorb(flight, scene_.transmittance(flight.media, hit.distance), balance);
+        }
         const int depth = flight.depth++;
         if (scene_.dielectric(hit.part)) {
-            return pass_interface(flight, point, depth, sampler, pending, balance);
+            return pass_interface(flight, point, {lanes.u[lane], lanes.v[lane]}, pending, balance);
         }
         const Bsdf bsdf = scene_.bsdf(point, hit);
         if (is_smooth(bsdf)) {
@@ -170,12 +232,14 @@ class Tracer {
             flight.has_arrived = true;
         }
         if (!has_lobe) return false;
+        const PathSampler sampler(target.key,
+                                  static_cast<std::uint32_t>(group.indices[flight.slot]));
         return scatter(flight, point, bsdf, depth, sampler, balance);
     }
 
-    bool pass_interface(Flight& flight, const ShadingPoint& point, int depth,
-                        const PathSampler& sampler, std::vector<Flight>& pending,
-                        PhotonBalance& balance) const {
+    /// @param u of kInterfaceUse
+    bool pass_interface(Flight& flight, const ShadingPoint& point, const Vec2f& u,
+                        std::vector<Flight>& pending, PhotonBalance& balance) const {
         const InterfaceEvent event = cross_interface(scene_, point, flight.direction, flight.media);
         const auto reflect_flight = [&](Flight& f) {
             f.direction = event.reflected;
@@ -200,7 +264,7 @@ class Tracer {
         Rgb faint_power = flight.power * (1 - strong);
         const float chance =
             std::min(1.0f, kFaintBranchBoost * faint_power.maxCoeff() / flight.initial);
-        const bool stays = sampler.number(depth, 2) < chance;
+        const bool stays = u.x() < chance;
         if (gamble(faint_power, flight.has_arrived, stays, chance, balance)) {
             Flight faint = flight;
             faint.power = faint_power;
@@ -210,7 +274,7 @@ class Tracer {
         flight.power *= strong;
         is_mostly_reflected ? reflect_flight(flight) : refract_flight(flight);
         return survive(
-            flight, [&] { return sampler.pair(depth, 2).y(); }, balance);
+            flight, [&] { return u.y(); }, balance);
     }
 
     /// Russian roulette: the power of those that stay makes up for those that go.
@@ -298,7 +362,6 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
     std::size_t done = 0;
     for (const PhotonTarget& target : targets) {
         const std::uint64_t first = target.count * static_cast<std::uint64_t>(options.pass);
-        const std::size_t size_before = result.photons.size();
         // A chunk at a time: photons wait in their blocks beside the list for its share alone.
         for (std::uint64_t start = 0; start < target.count; start += kChunk) {
             const std::uint64_t count = std::min<std::uint64_t>(kChunk, target.count - start);
@@ -314,18 +377,19 @@ CausticPhotons trace_caustics(const RenderScene& scene, const CausticOptions& op
                     trace_both(target, group, block);
                 }
             });
+            // Grown by doubling, the list would be held twice: its size is foreseeable.
+            if (start == 0) {
+                double stored = 0;
+                for (const Block& block : blocks) stored += double(block.photons.size());
+                const double share =
+                    static_cast<double>(target.count - count) / static_cast<double>(count);
+                result.photons.reserve(result.photons.size() +
+                                       static_cast<std::size_t>((1 + 1.02 * share) * stored) + 1);
+            }
             for (const Block& block : blocks) {
                 result.photons.insert(result.photons.end(), block.photons.begin(),
                                       block.photons.end());
                 result.balance += block.balance;
-            }
-            // Grown by doubling, the list would be held twice: its size is foreseeable.
-            if (start == 0) {
-                const double share =
-                    static_cast<double>(target.count - count) / static_cast<double>(count);
-                const auto stored = static_cast<double>(result.photons.size() - size_before);
-                result.photons.reserve(result.photons.size() +
-                                       static_cast<std::size_t>(1.02 * share * stored));
             }
         }
         progress.update(static_cast<double>(++done) / static_cast<double>(targets.size()),

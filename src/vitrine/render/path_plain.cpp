@@ -57,16 +57,7 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
         State& state = *hits[lane(i)].state;
         const Hit& hit = *hits[lane(i)].hit;
         const PartShape& shape = scene_.shape(hit.part);
-        const Triangle& triangle = shape.triangles[hit.triangle];
-        for (int k = 0; k < 3; ++k) lanes.corner[k].set(i, shape.vertices[triangle[k]]);
-        for (int k = 0; shape.normals && k < 3; ++k) {
-            lanes.corner_normal[k].set(i, shape.normals[triangle[k]]);
-        }
-        lanes.weight1[lane(i)] = hit.barycentric.x();
-        lanes.weight2[lane(i)] = hit.barycentric.y();
-        lanes.is_rounded[lane(i)] = shape.normals ? 1 : 0;
-        lanes.facet.set(i, hit.normal);
-        lanes.direction.set(i, state.direction);
+        set_hit(lanes, i, shape, hit, state.direction);
         lanes.albedo.set(
             i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(hit.part, hit));
         lanes.throughput.set(i, state.throughput);
@@ -81,7 +72,8 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
             state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
         }
     }
-    find_surfaces(lanes, scene_.epsilon(), count);
+    find_surfaces(lanes, count);
+    find_origins(lanes, scene_.epsilon(), count);
     add_direct(wave, hits);
     Lane<std::uint32_t> is_open = lanes.can_scatter;
     for (int i = 0; i < count; ++i) {

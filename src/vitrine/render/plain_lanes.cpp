@@ -43,9 +43,9 @@ inline void concentric_disc(float u, float v, float& point_x, float& point_y) {
 
 }  // namespace
 
-VITRINE_WIDE void find_surfaces(PlainLanes& lanes, float epsilon, int count) {
+VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
     const int n = rounded_up(count);
-    Lane<float> side;  // of the surface that the ray came from
+    Lane<float>& side = lanes.side;
     for (int i = 0; i < n; ++i) {
         const float wb = lanes.weight1[i], wc = lanes.weight2[i];
         const float wa = 1.0f - wb - wc;
@@ -79,6 +79,11 @@ VITRINE_WIDE void find_surfaces(PlainLanes& lanes, float epsilon, int count) {
         lanes.shading.y[i] = is_used ? sign * y : lanes.geometric.y[i];
         lanes.shading.z[i] = is_used ? sign * z : lanes.geometric.z[i];
     }
+}
+
+VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
+    const int n = rounded_up(count);
+    const Lane<float>& side = lanes.side;
     for (int i = 0; i < n; ++i) {
         const float px = lanes.position.x[i], py = lanes.position.y[i], pz = lanes.position.z[i];
         const float w[3] = {1.0f - lanes.weight1[i] - lanes.weight2[i], lanes.weight1[i],

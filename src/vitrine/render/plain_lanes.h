@@ -4,7 +4,7 @@
 // `LightSampler::sample` and `sample(DiffuseBsdf)`.
 #pragma once
 
-#include "render/light_sampler.h"
+#include "render/render_scene.h"
 
 #include <array>
 #include <cstdint>
@@ -52,6 +52,7 @@ struct PlainLanes {
     Lanes3 direction;                ///< of the ray
     Lanes3 albedo;
     // The surface; see ShadingPoint.
+    Lane<float> side;  ///< 1: the ray came from outside, -1
     Lanes3 position, geometric, shading;
     Lanes3 smooth;  ///< smooth_position
     Lanes3 origin;  ///< of rays that leave: RenderScene::leave_smooth
@@ -71,10 +72,28 @@ struct PlainLanes {
     Lane<float> open;  ///< above 0: it leaves the surface and carries something
 };
 
-// All of these work on the first `count` lanes, rounded up to whole steps.
+/// Puts what a ray met into a lane.
+inline void set_hit(PlainLanes& lanes, int i, const PartShape& shape, const Hit& hit,
+                    const Vec3f& direction) {
+    const auto k = static_cast<std::size_t>(i);
+    const Triangle& triangle = shape.triangles[hit.triangle];
+    for (int c = 0; c < 3; ++c) lanes.corner[c].set(i, shape.vertices[triangle[c]]);
+    for (int c = 0; shape.normals && c < 3; ++c) {
+        lanes.corner_normal[c].set(i, shape.normals[triangle[c]]);
+    }
+    lanes.weight1[k] = hit.barycentric.x();
+    lanes.weight2[k] = hit.barycentric.y();
+    lanes.is_rounded[k] = shape.normals ? 1 : 0;
+    lanes.facet.set(i, hit.normal);
+    lanes.direction.set(i, direction);
+}
 
-/// Fills position, geometric, shading, origin from what was met.
-void find_surfaces(PlainLanes& lanes, float epsilon, int count);
+// All that follow work on the first `count` lanes, rounded up to whole steps.
+
+/// Fills side, position, geometric, shading from what was met.
+void find_surfaces(PlainLanes& lanes, int count);
+/// Then smooth and origin.
+void find_origins(PlainLanes& lanes, float epsilon, int count);
 
 /// PathSampler::pair(depth, use, of, k) of each lane.
 void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<float>& u, Lane<float>& v,

@@ -56,16 +56,7 @@ struct Points {
         for (int i = 0; i < kCount; ++i) {
             const Hit& hit = hits[lane(i)];
             const PartShape& shape = scene.shape(hit.part);
-            for (int k = 0; k < 3; ++k) {
-                const int v = shape.triangles[hit.triangle][k];
-                lanes.corner[k].set(i, shape.vertices[v]);
-                lanes.corner_normal[k].set(i, shape.normals ? shape.normals[v] : hit.normal);
-            }
-            lanes.is_rounded[lane(i)] = shape.normals ? 1 : 0;
-            lanes.weight1[lane(i)] = hit.barycentric.x();
-            lanes.weight2[lane(i)] = hit.barycentric.y();
-            lanes.facet.set(i, hit.normal);
-            lanes.direction.set(i, directions[lane(i)]);
+            set_hit(lanes, i, shape, hit, directions[lane(i)]);
             lanes.albedo.set(i, Rgb(0.6f, 0.5f, 0.4f));
             lanes.throughput.set(i, Rgb(0.9f, 0.8f, 0.7f));
             lanes.can_scatter[lane(i)] = i % 3 == 0 ? 0 : 1;
@@ -76,7 +67,8 @@ struct Points {
             lanes.random.use[lane(i)] = static_cast<std::uint32_t>(2 + i % 9);
             lanes.random.of[lane(i)] = static_cast<std::uint32_t>(1 + i % 4);
         }
-        find_surfaces(lanes, scene.epsilon(), kCount);
+        find_surfaces(lanes, kCount);
+        find_origins(lanes, scene.epsilon(), kCount);
     }
     ShadingPoint point(int i) const { return scene.surface(hits[lane(i)], directions[lane(i)]); }
 };
