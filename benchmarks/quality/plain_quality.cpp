@@ -43,7 +43,7 @@ Mask all_special(const fs::path& folder, const std::string& frame, const Camera&
 struct RelativeError {
     double mean = 0, median = 0, bias = 0;
     double noise = 0;   ///< mean of what pixel noise alone makes of it, of both pictures
-    double even = 0;    ///< root mean square of what is left without the noise of either picture
+    double even = 0;    ///< root of the mean product of neighbours: what no pixel noise makes
     double ours = 0;    ///< of ours alone, by the spread of its paths (its sharp light)
     double coarse = 0;  ///< of means over 8 x 8 pixels, an eighth of whose noise is left
     std::size_t count = 0;
@@ -99,7 +99,7 @@ RelativeError relative_error(const RenderedImage& image, const ImageRgb& referen
                 (error(x - 1, y) + error(x + 1, y) + error(x, y - 1) + error(x, y + 1)) / 4;
             const double noise = (error(x, y) - around) / std::sqrt(1.25) / level;
             result.noise += std::abs(noise);
-            result.even += errors.back() * errors.back() - noise * noise;
+            result.even += error(x, y) * around / (level * level);
             ++inner;
         }
     }
@@ -162,7 +162,8 @@ void compare_plain(const RenderQualityOptions& options, const TruthScene& truth,
         const RelativeError e = relative_error(image, reference, plain);
         std::printf(
             "%s plain: mean relative error %.4f (median %.4f; pixel noise alone %.4f, ours alone "
-            "%.4f; rms without pixel noise %.4f; means of 8 x 8 pixels %.4f) bias %+.4f (%zu px)  "
+            "%.4f; rms that neighbours share %.4f; means of 8 x 8 pixels %.4f) bias %+.4f (%zu px) "
+            " "
             "caustic flux %.4f correlation "
             "%.4f (%zu px)  %.1f s\n",
             camera.id.c_str(), e.mean, e.median, e.noise, e.ours, e.even, e.coarse, e.bias, e.count,

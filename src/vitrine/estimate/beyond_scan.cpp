@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kMinPixels = 12;
 constexpr std::size_t kMinViews = 2;
-constexpr float kMinShare = 0.5f;  // of a pixel's light: what shows it well
+constexpr float kMinShare = 0.5f;   // of a pixel's light: what shows it well
 constexpr double kDarkest = 0.003;  // of the bright level
 constexpr int kGrid = 15, kEvaluations = 9;
 constexpr double kCap = 0.25;  // of the bright level, as in the fit of the index
