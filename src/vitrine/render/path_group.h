@@ -55,7 +55,7 @@ class PathGroup {
     }
 
   private:
-    static constexpr std::size_t kTogether = 256;
+    static constexpr std::size_t kTogether = 128;
     struct List {
         std::vector<int> columns;
         std::vector<PathTask> tasks;
