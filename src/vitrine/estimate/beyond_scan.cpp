@@ -14,6 +14,8 @@ constexpr int kMinPixels = 12;
 constexpr std::size_t kMinViews = 2;
 constexpr float kMinShare = 0.5f;   // of a pixel's light: what shows it well
 constexpr double kDarkest = 0.003;  // of the bright level
+constexpr float kMaxRatio = 2.0f;   // to what was assumed, which in made worlds is off by a fifth,
+constexpr double kMargin = 0.03;    // and of the bright level: where next to nothing was
 constexpr int kGrid = 15, kEvaluations = 9;
 constexpr double kCap = 0.25;  // of the bright level, as in the fit of the index
 
@@ -63,6 +65,9 @@ std::optional<Rgb> radiance_beyond(const std::vector<ThroughPixel>& through,
             std::log(kDarkest * bright), std::log(bright), kGrid, kEvaluations);
         radiance[c] = static_cast<float>(std::exp(best.x));
     }
+    // Much brighter than the ambient light it is only where the body is not what it is taken for.
+    const Rgb highest = kMaxRatio * assumed + static_cast<float>(kMargin * bright);
+    if ((radiance > highest).any()) return std::nullopt;
     return radiance;
 }
 

@@ -15,7 +15,8 @@ namespace vitrine {
 void add_beyond(std::vector<ThroughPixel>& through, const Rgb& change);
 
 /// The radiance beyond the scan that together with the absorption it calls for explains the pixels
-/// best (least absolute deviations); nothing when fewer than 12 pixels in two views show it.
+/// best (least absolute deviations); nothing when fewer than 12 pixels in two views show it, or
+/// when it would be more than twice as bright as assumed.
 /// @param through predictions that hold `assumed` there
 /// @param known_sigma_a the absorption when it is given
 std::optional<Rgb> radiance_beyond(const std::vector<ThroughPixel>& through,
