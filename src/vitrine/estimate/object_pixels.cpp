@@ -98,13 +98,15 @@ std::vector<ObjectPixel> object_pixels(const EstimationScene& scene, const Frame
                     scene.accel().closest({eye, pixel.direction, 0.0f, 1e30f, kAllMask});
                 if (!hit.is_hit()) continue;
                 pixel.surface = {hit_point(mesh, hit), shading_normal(mesh, hit)};
-                const auto turn = [&](int du, int dv) -> Vec3f {
+                const auto normal_at = [&](int du, int dv) -> Vec3f {
                     const Vec3f ray = camera.ray_in_world(u + du, v + dv).cast<float>();
                     const Hit near = scene.accel().closest({eye, ray, 0.0f, 1e30f, kAllMask});
-                    if (near.part != hit.part) return Vec3f::Zero();
-                    return shading_normal(mesh, near) - pixel.surface.normal;
+                    return near.part == hit.part ? shading_normal(mesh, near)
+                                                 : pixel.surface.normal;
                 };
-                pixel.normal_variance = variance_within(turn(1, 0), turn(0, 1));
+                pixel.turn_u = 0.5f * (normal_at(1, 0) - normal_at(-1, 0));
+                pixel.turn_v = 0.5f * (normal_at(0, 1) - normal_at(0, -1));
+                pixel.normal_variance = variance_within(pixel.turn_u, pixel.turn_v);
                 pixel.radiance = colour(u, v);
                 for (int c = 0; c < 3; ++c)
                     pixel.is_at_least[static_cast<std::size_t>(c)] =

@@ -17,6 +17,7 @@ struct ObjectPixel {
     SurfacePoint surface;
     float normal_variance = 0.0f;  ///< mean square turn of the normal within the pixel, rad^2:
                                    ///< twice that of the direction in which it turns least
+    Vec3f turn_u = Vec3f::Zero(), turn_v = Vec3f::Zero();  ///< of the normal from pixel to pixel
     Rgb radiance = Rgb::Zero();
     bool is_clipped = false;            ///< this pixel or a neighbour, into which it may have bled
     std::array<bool, 3> is_at_least{};  ///< channels clipped in this very pixel

@@ -15,16 +15,28 @@ namespace {
 
 constexpr int kGatherRays = 48;
 
+/// Frame at the k-th of many places within the pixel (Roberts' R2 sequence): a lobe about as narrow
+/// as the normal turns within a pixel is seen as the mean over it.
+Frame frame_within(const ObjectPixel& pixel, int k) {
+    const auto place = [k](float step) {
+        const float x = 0.5f + step * static_cast<float>(k);
+        return x - std::floor(x) - 0.5f;
+    };
+    return Frame(
+        (pixel.surface.normal + place(0.7548777f) * pixel.turn_u + place(0.5698403f) * pixel.turn_v)
+            .normalized());
+}
+
 /// Radiance per unit rho_s of the reflected surroundings, lamps left out. Half vectors follow the
 /// lobe (Ward 1992, Eq. 7 and 8); what remains of f cos / pdf is cos^3 h (h.o) times the cosines.
 Rgb reflected_surroundings(const EstimationScene& scene, const ObjectPixel& pixel,
                            const KnownLight& light, const WardLobe& lobe, int samples,
                            std::uint32_t key) {
-    const Frame frame(pixel.surface.normal);
-    const Vec3f wo = frame.to_local(-pixel.direction);
     const Vec3f origin = pixel.surface.position + 2e-4f * pixel.surface.normal;
     Rgb sum = Rgb::Zero();
     for (int k = 0; k < samples; ++k) {
+        const Frame frame = frame_within(pixel, k);
+        const Vec3f wo = frame.to_local(-pixel.direction);
         const auto index = static_cast<std::uint32_t>(k);
         const float u = scrambled_sobol(index, 0, key), v = scrambled_sobol(index, 1, key);
         const float radius = std::sqrt(-std::log(1.0f - u)), phi = 2.0f * kPif * v;
@@ -58,9 +70,9 @@ template <typename Visit>
 void for_each_lamp_point(const ObjectPixel& pixel, const DiscLight& lamp, int samples,
                          const Visit& visit) {
     const Frame disc(lamp.normal.cast<float>());
-    const Frame frame(pixel.surface.normal);
-    const Vec3 wo = frame.to_local(-pixel.direction).cast<double>();
     for (int k = 0; k < samples; ++k) {
+        const Frame frame = frame_within(pixel, k);
+        const Vec3 wo = frame.to_local(-pixel.direction).cast<double>();
         const float r = static_cast<float>(lamp.radius_m) *
                         std::sqrt((static_cast<float>(k) + 0.5f) / static_cast<float>(samples));
         const float angle = 2.39996323f * static_cast<float>(k);

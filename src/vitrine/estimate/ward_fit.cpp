@@ -112,7 +112,8 @@ double variance_within_pixels(const std::vector<ObjectPixel>& pixels,
 }
 
 /// The lobe seen is the true one widened by normals that turn (`variance`, rad^2, both axes).
-void correct_for_normals(WardFit& fit, const WardLobe& lobe, bool is_at_bound, double variance) {
+void correct_for_normals(WardFit& fit, const WardLobe& lobe, bool is_at_bound, double variance,
+                         double within) {
     // Not below this share of the square seen: what is left would be a difference of errors.
     constexpr double kMinShare = 0.5;
     const auto corrected = [variance](double sigma) {
@@ -123,7 +124,8 @@ void correct_for_normals(WardFit& fit, const WardLobe& lobe, bool is_at_bound, d
     fit.ward.sigma_y = corrected(lobe.sigma_y);
     fit.sigma.value = std::sqrt(fit.ward.sigma_x * fit.ward.sigma_y);
     fit.sigma.outcome = Outcome::Converged;
-    if (variance > kMinShare * lobe.sigma_x * lobe.sigma_y) {
+    const double square = lobe.sigma_x * lobe.sigma_y;
+    if (variance > kMinShare * square || within > square) {
         fit.sigma.outcome = Outcome::NotIdentifiable;
         fit.sigma.reason =
             "normals turn more, over the hull or within a pixel, than the lobe is wide";
@@ -270,9 +272,9 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
         all += s + luminance(Rgb(best.rho_d * columns.diffuse[i]));
     }
     fit.lobe_share = lobe / all;
-    const double variance = 2.0 * options.normal_noise_rad * options.normal_noise_rad +
-                            variance_within_pixels(model.pixels(), columns);
-    correct_for_normals(fit, found.lobe, found.is_at_bound, variance);
+    const double noise = 2.0 * options.normal_noise_rad * options.normal_noise_rad;
+    const double within = variance_within_pixels(model.pixels(), columns);
+    correct_for_normals(fit, found.lobe, found.is_at_bound, noise, within);
     if (model.lit_share() < kMinLitShare) {
         fit.sigma.outcome = Outcome::NotIdentifiable;
         fit.sigma.reason = "no lamp reaches what the pictures show of it: there is no highlight";
@@ -280,7 +282,7 @@ WardFit fit_ward(const SpecularModel& model, double bright, const SpecularOption
     set_deviations(model, found.lobe, bright, fit);
     // The correction holds for the mean pixel: half of it is doubt.
     const double corrected_by =
-        std::sqrt(found.lobe.sigma_x * found.lobe.sigma_y) - fit.sigma.value;
+        std::sqrt(found.lobe.sigma_x * found.lobe.sigma_y + within) - fit.sigma.value;
     fit.sigma.stddev = std::hypot(fit.sigma.stddev, 0.5 * corrected_by);
     log_debug(
         "ward: sigma {:.4f} +- {:.4f}, corrected by {:.4f}; rho_d {:.4f} +- {:.4f}, rho_s {:.4f} "
