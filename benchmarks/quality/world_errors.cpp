@@ -115,9 +115,9 @@ double reflected_of_even(const Vec3& wo, const Ward& ward) {
             const Vec3 h = Vec3(radius * std::cos(phi), radius * std::sin(phi), 1.0).normalized();
             const Vec3 wi = 2.0 * wo.dot(h) * h - wo;
             if (wi.z() <= 0.0 || wo.dot(h) <= 0.0) continue;
-            const double density = std::exp(-radius * radius / (ward.sigma_x * ward.sigma_x)) /
-                                   (4.0 * kPi * ward.sigma_x * ward.sigma_x * wo.dot(h) *
-                                    std::pow(h.z(), 3.0));
+            const double density =
+                std::exp(-radius * radius / (ward.sigma_x * ward.sigma_x)) /
+                (4.0 * kPi * ward.sigma_x * ward.sigma_x * wo.dot(h) * std::pow(h.z(), 3.0));
             sum += wi.z() * ward_lobe(wo, wi, ward.sigma_x, ward.form == WardForm::Duer) / density;
         }
     return sum / (kRings * kSpokes);
