@@ -45,7 +45,7 @@ constexpr double kHullNormal_rad = 0.025;
 constexpr double kModelLogSigma = 0.03;
 constexpr double kModelRhoDPerRhoS = 0.01;  // what the lobe mirrors is not known better
 constexpr double kModelLogRhoD = 0.02;
-constexpr double kModelLogRhoS = 0.065;
+constexpr double kModelLogRhoS = 0.02;
 
 /// What a fit of solid glass tells of its own model error.
 struct SolidDoubt {
