@@ -24,10 +24,10 @@ LitRelief::LitRelief(const Relief& relief, ReliefSamples samples, ReliefObservat
     const auto look = [&](const SurfacePoints& points, SkyShares& sky) {
         BallBounce::View view = bounce_->view_from(points);
         sky = std::move(view.sky);
-        return std::move(view.patches);
+        return view.patches;
     };
-    sample_view_ = look(sample_points_, sample_sky_);
-    observation_view_ = look(observation_points_, observation_sky_);
+    sample_view_ = look(sample_points_, sample_sky_).sparseView();
+    observation_view_ = look(observation_points_, observation_sky_).sparseView();
     look(bounce_->patches(), patch_sky_);
 }
 

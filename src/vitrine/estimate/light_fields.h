@@ -5,6 +5,8 @@
 #include "estimate/distance_histogram.h"
 #include "render/ball_bounce.h"
 
+#include <Eigen/SparseCore>
+
 #include <optional>
 
 namespace vitrine {
@@ -46,7 +48,8 @@ class LitRelief {
     SkyShares sample_sky_, observation_sky_;
     std::optional<BallBounce> bounce_;  // of a cluster
     SkyShares patch_sky_;
-    Eigen::MatrixXf sample_view_, observation_view_;
+    /// What samples and observations see of its patches: few each.
+    Eigen::SparseMatrix<float, Eigen::RowMajor> sample_view_, observation_view_;
     double eta_;
     bool use_shadows_;
 };
