@@ -14,9 +14,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// For the gain of closed bodies, which hardly changes from height to height.
-constexpr double kTypicalAlbedo = 0.6;
-
 struct Pair {
     std::size_t front, back;
     double rise;  ///< between centres when they touch
@@ -51,6 +48,7 @@ class Heights {
           observations_(draw_observations(cluster, excluded,
                                           static_cast<std::size_t>(options.observation_count), 2.0,
                                           0.2, stream_key(options.seed, 0x33))) {
+        if (!has_pixels()) return;
         y_ = exitance_rows(gaussian_blur(diffuse, 1.0), observations_, options.eta);
         for (const ViewLight& light : lights.lights.lights) directions_.push_back(light.direction);
         const LitRelief object(work_, samples_, observations_, options.eta, true);
@@ -64,11 +62,12 @@ class Heights {
             operators_.emplace_back(object, lights.kernel[static_cast<std::size_t>(c)],
                                     curved_body_factor(kTypicalAlbedo));
         }
+        if (channels_.empty()) return;
         weight_ = y_.cwiseMax(0.2).cwiseInverse();
         reweight(object);
     }
 
-    bool can_tell() const { return observations_.pixel.size() >= 50 && !channels_.empty(); }
+    bool can_tell() const { return has_pixels() && !channels_.empty(); }
 
     double cost(const std::vector<Ball>& balls) {
         ReliefSamples samples = samples_;
@@ -117,6 +116,8 @@ class Heights {
         VectorXd intensity;
         double misfit = 0;
     };
+
+    bool has_pixels() const { return observations_.pixel.size() >= 50; }
 
     float rise(const std::vector<Ball>& balls, std::int16_t ball) const {
         const auto k = static_cast<std::size_t>(ball);

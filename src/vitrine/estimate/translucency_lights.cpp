@@ -17,8 +17,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-/// Of wax, milk, marble and flesh; C(s) changes little around it.
-constexpr double kTypicalAlbedo = 0.6;
 /// By which balls light each other, before it is fitted (few_lamps.h).
 constexpr double kUsualBounce = 0.3;
 /// Light thrown back by the ground is common, but dearer than a lamp: it must earn its place.

@@ -13,6 +13,9 @@
 
 namespace vitrine {
 
+/// Of wax, milk, marble and flesh; C(s) of closed bodies changes little around it.
+constexpr double kTypicalAlbedo = 0.6;
+
 struct TranslucencyLightOptions {
     /// Who is soft? 1: the material (kernels of 0.08 to 0.6 inradii, little ambient light), as
     /// suits a material photo; 0: the light (0.02 to 0.1), as suits an object photo. One

@@ -362,6 +362,8 @@ TEST(BallHeights, ShadowsTellHowFarABallLiesBefore) {
     EXPECT_NEAR(height(refine_ball_heights(relief, picture, Mask(), at_truth)), height(truth), 8);
     EXPECT_LT(at_truth.relative_residual, found.relative_residual);
     EXPECT_GT(at_truth.ball_albedo[1], 0.1);  // that they light each other is seen
+    // Lamps that no picture told of say nothing of heights either.
+    EXPECT_EQ(height(refine_ball_heights(start, picture, Mask(), {})), height(touching));
 }
 
 TEST(TranslucencyLights, GroundIsFoundWhereItShines) {
