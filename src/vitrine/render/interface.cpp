@@ -12,45 +12,50 @@ Vec3f mirror_direction(const ShadingPoint& point, const Vec3f& direction) {
     return reflected.normalized();
 }
 
-InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
-                               const Vec3f& direction, const Media& media) {
-    InterfaceEvent event;
-    event.beyond = media;
-    if (point.is_front) {
-        event.beyond.enter(point.part, scene.medium_rank());
+Boundary cross_boundary(const RenderScene& scene, int part, bool is_front, const Media& media) {
+    Boundary boundary{media, 1.0f};
+    if (is_front) {
+        boundary.beyond.enter(part, scene.medium_rank());
     } else {
-        event.beyond.leave(point.part);
+        boundary.beyond.leave(part);
     }
     // Leaving a body that was never entered (open mesh, start inside): its own index is meant.
     float ior_before = scene.ior(media);
-    if (!point.is_front && !media.contains(point.part)) {
-        ior_before = static_cast<float>(scene.dielectric(point.part)->ior);
+    if (!is_front && !media.contains(part)) {
+        ior_before = static_cast<float>(scene.dielectric(part)->ior);
     }
-    const float ior_beyond = scene.ior(event.beyond);
-    event.eta = ior_beyond / ior_before;
-    if (event.eta == 1.0f) {
-        event.is_optical = false;
-        event.refracted = direction;
-        return event;
-    }
+    boundary.eta = scene.ior(boundary.beyond) / ior_before;
+    return boundary;
+}
+
+BentRays bend(const ShadingPoint& point, const Vec3f& direction, float eta) {
+    BentRays rays;
     const Vec3f wo = -direction;
     Vec3f normal = point.shading_normal;
     // At the outline the rounded surface may face away from a ray that meets the facet.
     if (wo.dot(normal) <= 0) normal = point.geometric_normal;
     float cos_t = 0;
-    event.reflectance = fresnel_dielectric(std::min(1.0f, wo.dot(normal)), event.eta, cos_t);
-    event.reflected = mirror_direction(point, direction);
-    if (event.reflectance < 1.0f) {
-        event.refracted = refract(wo, normal, event.eta, cos_t).normalized();
-        if (event.refracted.dot(point.geometric_normal) >= 0) {
+    rays.reflectance = fresnel_dielectric(std::min(1.0f, wo.dot(normal)), eta, cos_t);
+    rays.reflected = mirror_direction(point, direction);
+    if (rays.reflectance < 1.0f) {
+        rays.refracted = refract(wo, normal, eta, cos_t).normalized();
+        if (rays.refracted.dot(point.geometric_normal) >= 0) {
             const Vec3f& g = point.geometric_normal;
-            event.reflectance = fresnel_dielectric(std::min(1.0f, wo.dot(g)), event.eta, cos_t);
-            if (event.reflectance < 1.0f) {
-                event.refracted = refract(wo, g, event.eta, cos_t).normalized();
-            }
+            rays.reflectance = fresnel_dielectric(std::min(1.0f, wo.dot(g)), eta, cos_t);
+            if (rays.reflectance < 1.0f) rays.refracted = refract(wo, g, eta, cos_t).normalized();
         }
     }
-    return event;
+    return rays;
+}
+
+InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
+                               const Vec3f& direction, const Media& media) {
+    const Boundary boundary = cross_boundary(scene, point.part, point.is_front, media);
+    if (boundary.eta == 1.0f) {
+        return {false, 0.0f, Vec3f::Zero(), direction, 1.0f, boundary.beyond};
+    }
+    const BentRays rays = bend(point, direction, boundary.eta);
+    return {true, rays.reflectance, rays.reflected, rays.refracted, boundary.eta, boundary.beyond};
 }
 
 }  // namespace vitrine

@@ -15,7 +15,24 @@ struct InterfaceEvent {
     Media beyond;                     ///< media after crossing
 };
 
-/// @param direction unit, of travel; @param media on this side
+/// What lies beyond a dielectric part's surface.
+struct Boundary {
+    Media beyond;      ///< media after crossing
+    float eta = 1.0f;  ///< index beyond / index before; 1: not optical
+};
+/// @param is_front from outside the part; @param media on this side
+Boundary cross_boundary(const RenderScene& scene, int part, bool is_front, const Media& media);
+
+/// The two rays at an optical boundary; members as of `InterfaceEvent`.
+struct BentRays {
+    float reflectance = 0.0f;
+    Vec3f reflected = Vec3f::Zero();
+    Vec3f refracted = Vec3f::Zero();
+};
+/// @param direction unit, of travel; @param eta index beyond / index before, not 1
+BentRays bend(const ShadingPoint& point, const Vec3f& direction, float eta);
+
+/// Both: @param direction unit, of travel; @param media on this side
 InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
                                const Vec3f& direction, const Media& media);
 

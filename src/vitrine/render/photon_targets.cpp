@@ -67,7 +67,7 @@ std::vector<PhotonTarget> find_targets(const RenderScene& scene, const CausticOp
     return targets;
 }
 
-std::vector<std::uint64_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
+std::vector<std::uint32_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
                                           std::uint64_t count) {
     constexpr unsigned kBits = 9;  // per axis: as many cells as half a chunk has photons
     constexpr std::size_t kCells = std::size_t{1} << (2 * kBits);
@@ -85,8 +85,10 @@ std::vector<std::uint64_t> coherent_order(const PhotonTarget& target, std::uint6
         ++start[code + 1];
     }
     for (std::size_t c = 0; c < kCells; ++c) start[c + 1] += start[c];
-    std::vector<std::uint64_t> order(count);
-    for (std::uint64_t k = 0; k < count; ++k) order[start[cell[k]]++] = first + k;
+    std::vector<std::uint32_t> order(count);
+    for (std::uint64_t k = 0; k < count; ++k) {
+        order[start[cell[k]]++] = static_cast<std::uint32_t>(first + k);
+    }
     return order;
 }
 

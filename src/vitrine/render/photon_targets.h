@@ -19,7 +19,7 @@ std::vector<PhotonTarget> find_targets(const RenderScene& scene, const CausticOp
 
 /// The photons [first, first + count) of a target, those sent in nearly the same direction one
 /// after the other: rays that run beside their neighbours share the work of finding what they meet.
-std::vector<std::uint64_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
+std::vector<std::uint32_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
                                           std::uint64_t count);
 
 }  // namespace vitrine

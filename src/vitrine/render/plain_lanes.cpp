@@ -27,8 +27,6 @@ inline float unit_float(std::uint32_t bits) {
     return static_cast<float>(static_cast<std::int32_t>(bits >> 8)) * 0x1p-24f;
 }
 
-constexpr int rounded_up(int count) { return (count + kLaneStep - 1) / kLaneStep * kLaneStep; }
-
 /// `sample_concentric_disc` of math/sampling.h without branches.
 inline void concentric_disc(float u, float v, float& point_x, float& point_y) {
     const float x = 2.0f * u - 1.0f, y = 2.0f * v - 1.0f;
@@ -44,7 +42,7 @@ inline void concentric_disc(float u, float v, float& point_x, float& point_y) {
 }  // namespace
 
 VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     Lane<float>& side = lanes.side;
     for (int i = 0; i < n; ++i) {
         const float wb = lanes.weight1[i], wc = lanes.weight2[i];
@@ -82,7 +80,7 @@ VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
 }
 
 VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     const Lane<float>& side = lanes.side;
     for (int i = 0; i < n; ++i) {
         const float px = lanes.position.x[i], py = lanes.position.y[i], pz = lanes.position.z[i];
@@ -112,7 +110,7 @@ VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
 
 VITRINE_WIDE void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<float>& u,
                                Lane<float>& v, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     Lane<std::uint64_t> key;
     Lane<std::uint32_t> seed;
     std::uint32_t deepest = 0;
@@ -136,7 +134,7 @@ VITRINE_WIDE void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<
 }
 
 VITRINE_WIDE void sample_light(PlainLanes& lanes, const LaneLight& light, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     const Vec3f &t = light.frame.tangent, &b = light.frame.bitangent, &normal = light.frame.normal;
     const float tx = t.x(), ty = t.y(), tz = t.z(), bx = b.x(), by = b.y(), bz = b.z();
     const float nx = normal.x(), ny = normal.y(), nz = normal.z();
@@ -185,7 +183,7 @@ VITRINE_WIDE void sample_light(PlainLanes& lanes, const LaneLight& light, int co
 }
 
 VITRINE_WIDE void receive_light(PlainLanes& lanes, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     for (int i = 0; i < n; ++i) {
         const float x = lanes.to_light.x[i], y = lanes.to_light.y[i], z = lanes.to_light.z[i];
         const float cosine =
@@ -211,7 +209,7 @@ VITRINE_WIDE void receive_light(PlainLanes& lanes, int count) {
 }
 
 VITRINE_WIDE void scatter_lanes(PlainLanes& lanes, int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     for (int i = 0; i < n; ++i) {
         float dx, dy;
         concentric_disc(lanes.u[i], lanes.v[i], dx, dy);
@@ -245,7 +243,7 @@ VITRINE_WIDE void scatter_lanes(PlainLanes& lanes, int count) {
 VITRINE_WIDE void unit_directions(const Vec3f& corner, const Vec3f& right, const Vec3f& down,
                                   const Lane<float>& x, const Lane<float>& y, Lanes3& direction,
                                   int count) {
-    const int n = rounded_up(count);
+    const int n = whole_steps(count);
     const float cx = corner.x(), cy = corner.y(), cz = corner.z();
     const float rx = right.x(), ry = right.y(), rz = right.z();
     const float dx = down.x(), dy = down.y(), dz = down.z();

@@ -15,6 +15,9 @@ constexpr int kLanes = 64;
 /// Loops run over a multiple of this.
 constexpr int kLaneStep = 16;
 
+/// Lanes that loops over the first `count` run over.
+constexpr int whole_steps(int count) { return (count + kLaneStep - 1) / kLaneStep * kLaneStep; }
+
 template <typename T>
 using Lane = std::array<T, kLanes>;
 

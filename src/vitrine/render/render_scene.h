@@ -28,6 +28,9 @@ class Media {
     /// @param rank order of precedence per part: lower displaces higher
     void enter(int part, const std::vector<int>& rank);
     void leave(int part);
+    bool operator==(const Media& other) const {
+        return std::equal(parts_, parts_ + count_, other.parts_, other.parts_ + other.count_);
+    }
 
   private:
     static constexpr int kCapacity = 6;   // more bodies inside each other are not told apart

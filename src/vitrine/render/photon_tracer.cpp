@@ -1,0 +1,310 @@
+#include "render/photon_tracer.h"
+
+namespace vitrine {
+namespace {
+
+/// The share of a photon's first power below which a flight is left to chance.
+constexpr float kSurePower = 0.25f;
+
+// Random numbers of a vertex.
+constexpr int kInterfaceUse = 2;
+constexpr int kScatterUse = 3;
+constexpr int kRouletteUse = 4;
+
+std::size_t lane(int i) { return static_cast<std::size_t>(i); }
+
+template <typename Flight>
+void absorb(Flight& flight, const Rgb& factor, PhotonBalance& balance) {
+    const double before = flight.power.sum();
+    flight.power *= factor;
+    if (!flight.has_arrived) balance.absorbed += before - flight.power.sum();
+}
+
+/// Calls `use` for parts of at most kLanes of the list.
+template <typename Use>
+void by_lanes(std::span<const std::uint32_t> numbers, const Use& use) {
+    for (std::size_t i = 0; i < numbers.size(); i += kLanes) {
+        use(numbers.subspan(i, std::min<std::size_t>(kLanes, numbers.size() - i)));
+    }
+}
+
+}  // namespace
+
+PhotonTracer::PhotonTracer(const RenderScene& scene, const CausticOptions& options)
+    : scene_(scene), options_(options) {
+    for (int part = 0; part < static_cast<int>(scene.scene().parts.size()); ++part) {
+        Receiver& receiver = receivers_.emplace_back();
+        receiver.is_virtual = scene.is_virtual(part);
+        const PartShape& shape = scene.shape(part);
+        if (scene.dielectric(part)) receiver.surface = Surface::Glass;
+        if (shape.is_diffuse) receiver.surface = Surface::Plain;
+        if (shape.has_one_albedo) receiver.photon.set_diffuse_albedo(shape.albedo);
+    }
+}
+
+void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonGroup& group) const {
+    group.is_touched.assign(group.indices.size(), 0);
+    group.slots.clear();
+    group.balance.shot += group.indices.size();
+    emit(target, group);
+    for (int depth = 0; !group.flights_.empty(); ++depth) {
+        meet(depth, view, group);
+        sort_out(target, depth, group);
+        group.next_.clear();
+        group.faint_.clear();
+        by_lanes(group.glass_, [&](std::span<const std::uint32_t> numbers) {
+            pass_glass(target, depth, numbers, group);
+        });
+        by_lanes(group.plain_, [&](std::span<const std::uint32_t> numbers) {
+            store_plain(view, numbers, group);
+        });
+        for (const std::uint32_t i : group.others_) {
+            Flight flight = group.flights_[i];
+            if (step(flight, group.hits_[i], target, depth, view, group)) {
+                group.next_.push_back(flight);
+            }
+        }
+        // The faint branches of neighbours are neighbours too.
+        group.next_.insert(group.next_.end(), group.faint_.begin(), group.faint_.end());
+        group.flights_.swap(group.next_);
+    }
+}
+
+/// Flights from the light, of those photons that carry something.
+void PhotonTracer::emit(const PhotonTarget& target, PhotonGroup& group) const {
+    const LightSampler& lights = scene_.lights();
+    const bool has_size = lights.needs_position(target.light);
+    const PathSampler first(target.key, 0);
+    RandomLanes random;
+    random.stream.fill(first.mixed_stream());
+    random.depth.fill(0);
+    random.use.fill(0);
+    random.of.fill(1);
+    Lane<float> u, v;
+    group.flights_.clear();
+    for (std::size_t begin = 0; begin < group.indices.size(); begin += kLanes) {
+        const std::size_t count = std::min<std::size_t>(kLanes, group.indices.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) random.index[i] = group.indices[begin + i];
+        random_pairs(random, 0, u, v, static_cast<int>(count));
+        for (std::size_t i = 0; i < count; ++i) {
+            const Vec2f on_light =
+                has_size ? first.at(random.index[i]).further_pair(0) : Vec2f(0.5f, 0.5f);
+            const EmittedRay emitted = lights.emit(target.light, target.sphere, {u[i], v[i]},
+                                                   on_light, scene_.bounding_sphere());
+            const Rgb power = emitted.power / static_cast<float>(target.count);
+            const float initial = power.maxCoeff();
+            if (!(initial > 0)) continue;
+            Flight& flight = group.flights_.emplace_back();
+            flight.origin = emitted.origin;
+            flight.direction = emitted.direction;
+            flight.power = power;
+            flight.initial = initial;
+            flight.slot = static_cast<std::uint32_t>(begin + i);
+        }
+    }
+}
+
+/// What the flights meet. The first surfaces are met side by side; behind them neighbours have
+/// parted, and Embree's packets of such rays cost more than the rays one by one.
+void PhotonTracer::meet(int depth, std::uint32_t view, PhotonGroup& group) const {
+    constexpr int kTogether = 4;
+    const std::vector<Flight>& flights = group.flights_;
+    group.hits_.resize(flights.size());
+    if (depth >= kTogether) {
+        for (std::size_t i = 0; i < flights.size(); ++i) {
+            group.hits_[i] =
+                scene_.closest({flights[i].origin, flights[i].direction, 0.0f, 1e30f, view});
+        }
+        return;
+    }
+    group.rays_.resize(flights.size());
+    for (std::size_t i = 0; i < flights.size(); ++i) {
+        group.rays_[i] = {flights[i].origin, flights[i].direction, 0.0f, 1e30f, view};
+    }
+    scene_.closest(group.rays_, group.hits_);
+}
+
+/// Ends the flights that met nothing that counts, and lists the others by what they met.
+void PhotonTracer::sort_out(const PhotonTarget& target, int depth, PhotonGroup& group) const {
+    for (auto* list : {&group.glass_, &group.plain_, &group.others_}) list->clear();
+    PhotonBalance& balance = group.balance;
+    for (std::size_t i = 0; i < group.flights_.size(); ++i) {
+        const Flight& flight = group.flights_[i];
+        const Hit& hit = group.hits_[i];
+        if (!hit.is_hit()) {
+            if (depth > 0 && !flight.has_arrived) balance.escaped += flight.power.sum();
+            continue;
+        }
+        scene_.prefetch_triangle(hit);
+        const Receiver& receiver = receivers_[static_cast<std::size_t>(hit.part)];
+        if (receiver.is_virtual) group.is_touched[flight.slot] = 1;
+        if (depth == 0) {
+            if (hit.part != target.part) continue;
+            ++balance.met;
+            balance.emitted += flight.power.sum();
+        }
+        if (depth > options_.max_interfaces) {
+            if (!flight.has_arrived) balance.ended += flight.power.sum();
+            continue;
+        }
+        const auto number = static_cast<std::uint32_t>(i);
+        switch (receiver.surface) {
+            case Surface::Glass:
+                group.glass_.push_back(number);
+                break;
+            case Surface::Plain:
+                group.plain_.push_back(number);
+                break;
+            case Surface::Other:
+                group.others_.push_back(number);
+                break;
+        }
+    }
+}
+
+/// Surfaces that the flights `numbers` met, and their power where they arrive, in lanes.
+void PhotonTracer::find_surfaces(std::span<const std::uint32_t> numbers, PhotonGroup& group) const {
+    const int count = static_cast<int>(numbers.size());
+    PlainLanes& surfaces = group.surfaces_;
+    for (int i = 0; i < count; ++i) scene_.prefetch_vertices(group.hits_[numbers[lane(i)]]);
+    for (int i = 0; i < count; ++i) {
+        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Hit& hit = group.hits_[numbers[lane(i)]];
+        set_hit(surfaces, i, scene_.shape(hit.part), hit, flight.direction);
+        Rgb power = flight.power;
+        if (group.media_.absorbs(flight.medium)) {
+            power *= scene_.transmittance(group.media_.media(flight.medium), hit.distance);
+            if (!flight.has_arrived) {
+                group.balance.absorbed += double(flight.power.sum()) - double(power.sum());
+            }
+        }
+        surfaces.throughput.set(i, power);
+    }
+    vitrine::find_surfaces(surfaces, count);
+}
+
+void PhotonTracer::pass_glass(const PhotonTarget& target, int depth,
+                              std::span<const std::uint32_t> numbers, PhotonGroup& group) const {
+    const int count = static_cast<int>(numbers.size());
+    PlainLanes& surfaces = group.surfaces_;
+    GlassLanes& glass = group.glass_lanes_;
+    find_surfaces(numbers, group);
+    surfaces.random.stream.fill(PathSampler(target.key, 0).mixed_stream());
+    surfaces.random.depth.fill(static_cast<std::uint32_t>(depth));
+    surfaces.random.use.fill(kInterfaceUse);
+    surfaces.random.of.fill(1);
+    Lane<std::uint32_t> beyond;
+    for (int i = 0; i < count; ++i) {
+        const Flight& flight = group.flights_[numbers[lane(i)]];
+        surfaces.random.index[lane(i)] = group.indices[flight.slot];
+        const MediumTable::Crossing crossing = group.media_.cross(
+            flight.medium, group.hits_[numbers[lane(i)]].part, surfaces.side[lane(i)] > 0);
+        beyond[lane(i)] = crossing.beyond;
+        glass.eta[lane(i)] = crossing.eta;
+        glass.initial[lane(i)] = flight.initial;
+    }
+    random_pairs(surfaces.random, 0, surfaces.u, surfaces.v, count);
+    bend_lanes(surfaces, glass, count);
+    branch_lanes(surfaces, scene_.epsilon(), glass, count);
+    const auto send_on = [&](const Flight& from, const BranchLanes& branch, int i,
+                             std::vector<Flight>& flights) {
+        Flight& flight = flights.emplace_back();
+        flight.origin = branch.origin.at(i);
+        flight.direction = branch.direction.at(i);
+        flight.power = branch.power.at(i).array();
+        flight.initial = from.initial;
+        flight.slot = from.slot;
+        flight.medium = branch.is_refracted[lane(i)] ? beyond[lane(i)] : from.medium;
+        flight.is_glossy = from.is_glossy;
+        flight.has_arrived = from.has_arrived;
+    };
+    for (int i = 0; i < count; ++i) {
+        const Flight& flight = group.flights_[numbers[lane(i)]];
+        if (!flight.has_arrived) group.balance.chance += glass.chance[lane(i)];
+        if (glass.strong.is_open[lane(i)]) send_on(flight, glass.strong, i, group.next_);
+        if (glass.faint.is_open[lane(i)]) send_on(flight, glass.faint, i, group.faint_);
+    }
+}
+
+void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t> numbers,
+                               PhotonGroup& group) const {
+    const int count = static_cast<int>(numbers.size());
+    PlainLanes& surfaces = group.surfaces_;
+    find_surfaces(numbers, group);
+    for (int i = 0; i < count; ++i) {
+        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Hit& hit = group.hits_[numbers[lane(i)]];
+        Photon& photon =
+            group.arrivals.emplace_back(receivers_[static_cast<std::size_t>(hit.part)].photon);
+        photon.position = surfaces.position.at(i);
+        photon.power = surfaces.throughput.at(i).array();
+        photon.to_light = PackedDirection(-flight.direction);
+        photon.normal = PackedDirection(surfaces.geometric.at(i));
+        if (!scene_.shape(hit.part).has_one_albedo) {
+            photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
+        }
+        photon.views = static_cast<std::uint8_t>(view);
+        photon.is_glossy = flight.is_glossy;
+        group.slots.push_back(flight.slot);
+        if (!flight.has_arrived) group.balance.stored += photon.power.sum();
+    }
+}
+
+/// Surfaces of other kinds; false when the flight ends.
+bool PhotonTracer::step(Flight& flight, const Hit& hit, const PhotonTarget& target, int depth,
+                        std::uint32_t view, PhotonGroup& group) const {
+    const ShadingPoint point = scene_.surface(hit, flight.direction);
+    if (group.media_.absorbs(flight.medium)) {
+        absorb(flight, scene_.transmittance(group.media_.media(flight.medium), hit.distance),
+               group.balance);
+    }
+    const Bsdf bsdf = scene_.bsdf(point, hit);
+    if (is_smooth(bsdf)) {
+        absorb(flight, std::get<MirrorBsdf>(bsdf).reflectance, group.balance);
+        flight.direction = mirror_direction(point, flight.direction);
+        flight.origin = scene_.leave(point, flight.direction);
+        return (flight.power > 0).any();
+    }
+    if (depth > 0) {
+        Photon& photon = group.arrivals.emplace_back();
+        photon.position = point.position;
+        photon.power = flight.power;
+        photon.to_light = PackedDirection(-flight.direction);
+        photon.normal = PackedDirection(point.geometric_normal);
+        photon.set_diffuse_albedo(diffuse_reflectance(bsdf));
+        photon.views = static_cast<std::uint8_t>(view);
+        photon.is_glossy = flight.is_glossy;
+        photon.keeps_direction = true;
+        group.slots.push_back(flight.slot);
+        if (!flight.has_arrived) group.balance.stored += flight.power.sum();
+        flight.has_arrived = true;
+    }
+    if (!(lobe_probability(bsdf, Lobe::Glossy) > 0)) return false;
+    return scatter(flight, point, bsdf, depth, {target.key, group.indices[flight.slot]},
+                   group.balance);
+}
+
+bool PhotonTracer::scatter(Flight& flight, const ShadingPoint& point, const Bsdf& bsdf, int depth,
+                           const PathSampler& sampler, PhotonBalance& balance) const {
+    const Frame frame(point.shading_normal);
+    const Vec3f wo = frame.to_local(-flight.direction);
+    BsdfSample s = sample(bsdf, wo, sampler.pair(depth, kScatterUse), 0x1.fffffep-1f);
+    s.weight *= lobe_probability(bsdf, Lobe::Glossy);
+    const Vec3f direction = frame.to_world(s.wi);
+    if (direction.dot(point.geometric_normal) <= 0) s.weight = Rgb::Zero();
+    absorb(flight, s.weight, balance);
+    if (!(flight.power > 0).any()) return false;
+    flight.direction = direction;
+    flight.origin = scene_.leave(point, direction);
+    flight.is_glossy = true;
+    const float survival = flight.power.maxCoeff() / (flight.initial * kSurePower);
+    if (survival >= 1) return true;
+    // Russian roulette: the power of those that stay makes up for those that go.
+    const bool stays = sampler.number(depth, kRouletteUse) < survival;
+    const double before = flight.power.sum();
+    if (stays) flight.power /= survival;
+    if (!flight.has_arrived) balance.chance += before - (stays ? flight.power.sum() : 0.0);
+    return stays;
+}
+
+}  // namespace vitrine
