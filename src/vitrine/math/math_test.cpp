@@ -1,6 +1,7 @@
 #include "base/rng.h"
 #include "math/rigid3.h"
 #include "math/sampling.h"
+#include "math/sampling_steps.h"
 #include "math/statistics.h"
 
 #include <gtest/gtest.h>
@@ -73,6 +74,15 @@ void expect_density(const Sample& sample, double cos_min,
     }
     const ChiSquareResult result = chi_square_test(observed, expected);
     EXPECT_GT(result.p_value, 0.001) << result.description;
+}
+
+TEST(Sampling, SinesOfATurn) {
+    for (int k = 0; k < 100000; ++k) {
+        const float turns = static_cast<float>(k) * 1e-5f;
+        const SineCosine value = sine_cosine_of_turn(turns);
+        ASSERT_NEAR(value.sine, std::sin(2 * kPi * turns), 2e-7) << turns;
+        ASSERT_NEAR(value.cosine, std::cos(2 * kPi * turns), 2e-7) << turns;
+    }
 }
 
 TEST(Sampling, DirectionsFollowTheirDensity) {

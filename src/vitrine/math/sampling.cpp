@@ -88,8 +88,8 @@ Vec3f sample_uniform_cone(const Vec2f& u, float cos_max) {
     // 1 - z rather than z: a narrow cone keeps its resolution.
     const float one_minus_z = u.x() * (1.0f - cos_max);
     const float r = std::sqrt(std::max(0.0f, one_minus_z * (2.0f - one_minus_z)));
-    const float phi = 2.0f * kPif * u.y();
-    return {r * std::cos(phi), r * std::sin(phi), 1.0f - one_minus_z};
+    const SineCosine turn = sine_cosine_of_turn(u.y());
+    return {r * turn.cosine, r * turn.sine, 1.0f - one_minus_z};
 }
 
 double cone_solid_angle(double half_angle_rad) {

@@ -1,7 +1,8 @@
 // math/sampling_steps.h: inner steps of the maps of math/sampling.h, for loops over many points:
-// Owen-scrambled Sobol points, and the sines of the concentric disc. Others call math/sampling.h.
+// Owen-scrambled Sobol points, and sines. Others call math/sampling.h.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace vitrine {
@@ -62,6 +63,32 @@ inline float sinc_below_eighth(float square) {
     return 1.0f + square * (-0x1.555556p-3f +
                             square * (0x1.111112p-7f +
                                       square * (-0x1.a01a02p-13f + square * 0x1.71de3ap-19f)));
+}
+
+/// `sample_concentric_disc` without branches.
+inline void concentric_disc(float u, float v, float& point_x, float& point_y) {
+    const float x = 2.0f * u - 1.0f, y = 2.0f * v - 1.0f;
+    const bool is_x_wide = std::abs(x) > std::abs(y);
+    const float r = is_x_wide ? x : y, other = is_x_wide ? y : x;
+    const float angle = 0x1.921fb6p-1f * (other / (r == 0.0f ? 1.0f : r)), square = angle * angle;
+    const float along = r * cosine_below_eighth(square);
+    const float across = r * angle * sinc_below_eighth(square);
+    point_x = is_x_wide ? along : across;
+    point_y = is_x_wide ? across : along;
+}
+
+/// Of `turns` in [0, 1) of a whole turn; right to 2e-7.
+struct SineCosine {
+    float sine, cosine;
+};
+inline SineCosine sine_cosine_of_turn(float turns) {
+    const auto quarter = static_cast<std::int32_t>(4.0f * turns + 0.5f);
+    const float angle = 0x1.921fb6p+2f * (turns - 0.25f * static_cast<float>(quarter));
+    const float square = angle * angle;
+    const float near = cosine_below_eighth(square), across = angle * sinc_below_eighth(square);
+    const bool is_odd = (quarter & 1) != 0;
+    const float s = is_odd ? near : across, c = is_odd ? across : near;
+    return {(quarter & 2) != 0 ? -s : s, ((quarter + 1) & 2) != 0 ? -c : c};
 }
 
 }  // namespace vitrine

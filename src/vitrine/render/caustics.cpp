@@ -1,7 +1,6 @@
 #include "render/caustics.h"
 
 #include "base/parallel.h"
-#include "render/photon_targets.h"
 #include "render/photon_tracer.h"
 
 #include <span>

@@ -27,18 +27,8 @@ void sample_light(PlainLanes& lanes, const LightSampler& lights, std::size_t lig
 }  // namespace
 
 std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
-    std::vector<std::optional<LaneLight>> result(lights.count());
-    for (std::size_t i = 0; i < lights.count(); ++i) {
-        if (const auto* disc = std::get_if<DiscLight>(&lights.light(i))) {
-            result[i] = {disc->position_m.cast<float>(), Frame(disc->normal.cast<float>()),
-                         static_cast<float>(disc->radius_m),
-                         kPif * static_cast<float>(disc->radius_m * disc->radius_m),
-                         disc->intensity_w_per_sr};
-        } else if (const auto* point = std::get_if<PointLight>(&lights.light(i))) {
-            result[i] = {point->position_m.cast<float>(), Frame(Vec3f(0, 0, 1)), 0, 0,
-                         point->intensity_w_per_sr};
-        }
-    }
+    std::vector<std::optional<LaneLight>> result;
+    for (std::size_t i = 0; i < lights.count(); ++i) result.push_back(lane_light(lights.light(i)));
     return result;
 }
 

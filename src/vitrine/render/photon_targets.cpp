@@ -67,29 +67,4 @@ std::vector<PhotonTarget> find_targets(const RenderScene& scene, const CausticOp
     return targets;
 }
 
-std::vector<std::uint32_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
-                                          std::uint64_t count) {
-    constexpr unsigned kBits = 9;  // per axis: as many cells as half a chunk has photons
-    constexpr std::size_t kCells = std::size_t{1} << (2 * kBits);
-    std::vector<std::uint32_t> cell(count);
-    std::vector<std::uint32_t> start(kCells + 1, 0);
-    for (std::uint64_t k = 0; k < count; ++k) {
-        const Vec2f u = PathSampler(target.key, static_cast<std::uint32_t>(first + k)).pair(0, 0);
-        const auto x = static_cast<unsigned>(u.x() * (1u << kBits));
-        const auto y = static_cast<unsigned>(u.y() * (1u << kBits));
-        unsigned code = 0;  // bits interleaved (Morton 1966)
-        for (unsigned bit = 0; bit < kBits; ++bit) {
-            code |= (x >> bit & 1u) << (2 * bit) | (y >> bit & 1u) << (2 * bit + 1);
-        }
-        cell[k] = code;
-        ++start[code + 1];
-    }
-    for (std::size_t c = 0; c < kCells; ++c) start[c + 1] += start[c];
-    std::vector<std::uint32_t> order(count);
-    for (std::uint64_t k = 0; k < count; ++k) {
-        order[start[cell[k]]++] = static_cast<std::uint32_t>(first + k);
-    }
-    return order;
-}
-
 }  // namespace vitrine

@@ -1,4 +1,4 @@
-// render/photon_targets.h: what a light's photons are aimed at, and in which order they fly.
+// render/photon_targets.h: what a light's photons are aimed at.
 #pragma once
 
 #include "render/caustics.h"
@@ -16,10 +16,5 @@ struct PhotonTarget {
 
 /// All pairs of a light and a part that bends it, with their shares of `options.photon_count`.
 std::vector<PhotonTarget> find_targets(const RenderScene& scene, const CausticOptions& options);
-
-/// The photons [first, first + count) of a target, those sent in nearly the same direction one
-/// after the other: rays that run beside their neighbours share the work of finding what they meet.
-std::vector<std::uint32_t> coherent_order(const PhotonTarget& target, std::uint64_t first,
-                                          std::uint64_t count);
 
 }  // namespace vitrine

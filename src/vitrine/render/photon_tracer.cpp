@@ -72,34 +72,24 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
 
 /// Flights from the light, of those photons that carry something.
 void PhotonTracer::emit(const PhotonTarget& target, PhotonGroup& group) const {
-    const LightSampler& lights = scene_.lights();
-    const bool has_size = lights.needs_position(target.light);
-    const PathSampler first(target.key, 0);
-    RandomLanes random;
-    random.stream.fill(first.mixed_stream());
-    random.depth.fill(0);
-    random.use.fill(0);
-    random.of.fill(1);
-    Lane<float> u, v;
+    const PhotonEmission emission(scene_, target);
+    EmittedLanes& photons = group.emitted_;
+    const std::span<const std::uint32_t> indices(group.indices);
     group.flights_.clear();
-    for (std::size_t begin = 0; begin < group.indices.size(); begin += kLanes) {
-        const std::size_t count = std::min<std::size_t>(kLanes, group.indices.size() - begin);
-        for (std::size_t i = 0; i < count; ++i) random.index[i] = group.indices[begin + i];
-        random_pairs(random, 0, u, v, static_cast<int>(count));
-        for (std::size_t i = 0; i < count; ++i) {
-            const Vec2f on_light =
-                has_size ? first.at(random.index[i]).further_pair(0) : Vec2f(0.5f, 0.5f);
-            const EmittedRay emitted = lights.emit(target.light, target.sphere, {u[i], v[i]},
-                                                   on_light, scene_.bounding_sphere());
-            const Rgb power = emitted.power / static_cast<float>(target.count);
+    for (std::size_t begin = 0; begin < indices.size(); begin += kLanes) {
+        const auto together =
+            indices.subspan(begin, std::min<std::size_t>(kLanes, indices.size() - begin));
+        emission.emit(together, photons);
+        for (int i = 0; i < static_cast<int>(together.size()); ++i) {
+            const Rgb power = photons.power.at(i).array();
             const float initial = power.maxCoeff();
             if (!(initial > 0)) continue;
             Flight& flight = group.flights_.emplace_back();
-            flight.origin = emitted.origin;
-            flight.direction = emitted.direction;
+            flight.origin = photons.origin.at(i);
+            flight.direction = photons.direction.at(i);
             flight.power = power;
             flight.initial = initial;
-            flight.slot = static_cast<std::uint32_t>(begin + i);
+            flight.slot = static_cast<std::uint32_t>(begin) + static_cast<std::uint32_t>(i);
         }
     }
 }

@@ -4,7 +4,7 @@
 #include "render/caustics.h"
 #include "render/glass_lanes.h"
 #include "render/medium_table.h"
-#include "render/photon_targets.h"
+#include "render/photon_emission.h"
 #include "render/sampler.h"
 
 #include <span>
@@ -42,6 +42,7 @@ class PhotonGroup {
     std::vector<Hit> hits_;
     std::vector<std::uint32_t> glass_, plain_, others_;  // numbers of the flights that met such
     MediumTable media_;
+    EmittedLanes emitted_ = {};
     PlainLanes surfaces_ = {};
     GlassLanes glass_lanes_ = {};
 };

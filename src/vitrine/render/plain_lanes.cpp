@@ -27,18 +27,6 @@ inline float unit_float(std::uint32_t bits) {
     return static_cast<float>(static_cast<std::int32_t>(bits >> 8)) * 0x1p-24f;
 }
 
-/// `sample_concentric_disc` of math/sampling.h without branches.
-inline void concentric_disc(float u, float v, float& point_x, float& point_y) {
-    const float x = 2.0f * u - 1.0f, y = 2.0f * v - 1.0f;
-    const bool is_x_wide = std::abs(x) > std::abs(y);
-    const float r = is_x_wide ? x : y, other = is_x_wide ? y : x;
-    const float angle = 0.25f * kPif * (other / (r == 0.0f ? 1.0f : r)), square = angle * angle;
-    const float along = r * cosine_below_eighth(square);
-    const float across = r * angle * sinc_below_eighth(square);
-    point_x = is_x_wide ? along : across;
-    point_y = is_x_wide ? across : along;
-}
-
 }  // namespace
 
 VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
@@ -131,6 +119,20 @@ VITRINE_WIDE void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<
         u[i] = pair.x();
         v[i] = pair.y();
     }
+}
+
+std::optional<LaneLight> lane_light(const Light& light) {
+    if (const auto* disc = std::get_if<DiscLight>(&light)) {
+        return LaneLight{disc->position_m.cast<float>(), Frame(disc->normal.cast<float>()),
+                         static_cast<float>(disc->radius_m),
+                         kPif * static_cast<float>(disc->radius_m * disc->radius_m),
+                         disc->intensity_w_per_sr};
+    }
+    if (const auto* point = std::get_if<PointLight>(&light)) {
+        return LaneLight{point->position_m.cast<float>(), Frame(Vec3f(0, 0, 1)), 0, 0,
+                         point->intensity_w_per_sr};
+    }
+    return std::nullopt;
 }
 
 VITRINE_WIDE void sample_light(PlainLanes& lanes, const LaneLight& light, int count) {

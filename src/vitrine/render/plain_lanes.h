@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 namespace vitrine {
 
@@ -109,6 +110,8 @@ struct LaneLight {
     float radius = 0, area = 0;
     Rgb intensity = Rgb::Zero();
 };
+/// Empty for lights of other kinds than disc and point.
+std::optional<LaneLight> lane_light(const Light& light);
 /// Fills to_light, distance, pdf, light (radiance / pdf), lit; uses u and v.
 void sample_light(PlainLanes& lanes, const LaneLight& light, int count);
 
