@@ -85,28 +85,8 @@ void bend_lanes(const PlainLanes& surfaces, GlassLanes& glass, int count) {
     }
 }
 
-namespace {
-
-/// `RenderScene::leave` with the direction of one of two.
-VITRINE_WIDE void aim(const PlainLanes& surfaces, const GlassLanes& glass, float epsilon,
-                      BranchLanes& branch, int n) {
-    const Lanes3& flat = surfaces.geometric;
-    for (int i = 0; i < n; ++i) {
-        const bool is_refracted = branch.is_refracted[i] != 0;
-        const float x = is_refracted ? glass.refracted.x[i] : glass.reflected.x[i];
-        const float y = is_refracted ? glass.refracted.y[i] : glass.reflected.y[i];
-        const float z = is_refracted ? glass.refracted.z[i] : glass.reflected.z[i];
-        const float side = dot(x, y, z, flat.x[i], flat.y[i], flat.z[i]) < 0 ? -epsilon : epsilon;
-        branch.direction.x[i] = x;
-        branch.direction.y[i] = y;
-        branch.direction.z[i] = z;
-        branch.origin.x[i] = surfaces.position.x[i] + side * flat.x[i];
-        branch.origin.y[i] = surfaces.position.y[i] + side * flat.y[i];
-        branch.origin.z[i] = surfaces.position.z[i] + side * flat.z[i];
-    }
-}
-
-VITRINE_WIDE void share_power(const PlainLanes& surfaces, GlassLanes& glass, int n) {
+VITRINE_WIDE void branch_lanes(const PlainLanes& surfaces, GlassLanes& glass, int count) {
+    const int n = whole_steps(count);
     for (int i = 0; i < n; ++i) {
         const float reflectance = glass.reflectance[i], initial = glass.initial[i];
         const bool is_split = (reflectance > 0) & (reflectance < 1);
@@ -146,15 +126,6 @@ VITRINE_WIDE void share_power(const PlainLanes& surfaces, GlassLanes& glass, int
         const float strong_taken = sum(strong_r, strong_g, strong_b) - (survives ? rest : 0.0f);
         glass.chance[i] = (is_split ? faint_taken : 0.0f) + (is_sure ? 0.0f : strong_taken);
     }
-}
-
-}  // namespace
-
-void branch_lanes(const PlainLanes& surfaces, float epsilon, GlassLanes& glass, int count) {
-    const int n = whole_steps(count);
-    share_power(surfaces, glass, n);
-    aim(surfaces, glass, epsilon, glass.strong, n);
-    aim(surfaces, glass, epsilon, glass.faint, n);
 }
 
 }  // namespace vitrine

@@ -6,9 +6,8 @@
 
 namespace vitrine {
 
-/// A ray that leaves a boundary.
+/// One of the two rays that leave a boundary.
 struct BranchLanes {
-    Lanes3 origin, direction;
     Lanes3 power;
     Lane<std::uint32_t> is_refracted;  ///< else reflected
     Lane<std::uint32_t> is_open;       ///< goes on
@@ -33,7 +32,6 @@ void bend_lanes(const PlainLanes& surfaces, GlassLanes& glass, int count);
 /// Both branches go on, the fainter with a chance that shrinks with its power, the stronger with
 /// one when it carries little of the photon's `initial` power: fills strong, faint, chance.
 /// @param surfaces  u decides of the faint branch, v of the strong one
-/// @param epsilon of `RenderScene::leave`
-void branch_lanes(const PlainLanes& surfaces, float epsilon, GlassLanes& glass, int count);
+void branch_lanes(const PlainLanes& surfaces, GlassLanes& glass, int count);
 
 }  // namespace vitrine

@@ -46,32 +46,33 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
     group.is_touched.assign(group.indices.size(), 0);
     group.slots.clear();
     group.balance.shot += group.indices.size();
-    emit(target, group);
-    for (int depth = 0; !group.flights_.empty(); ++depth) {
-        meet(depth, view, group);
+    emit(target, view, group);
+    for (int depth = 0; !group.flights_.rays.empty(); ++depth) {
+        meet(depth, group);
         sort_out(target, depth, group);
         group.next_.clear();
         group.faint_.clear();
         by_lanes(group.glass_, [&](std::span<const std::uint32_t> numbers) {
-            pass_glass(target, depth, numbers, group);
+            pass_glass(target, depth, view, numbers, group);
         });
         by_lanes(group.plain_, [&](std::span<const std::uint32_t> numbers) {
             store_plain(view, numbers, group);
         });
         for (const std::uint32_t i : group.others_) {
-            Flight flight = group.flights_[i];
-            if (step(flight, group.hits_[i], target, depth, view, group)) {
-                group.next_.push_back(flight);
+            Flight flight = group.flights_.carried[i];
+            Ray ray = group.flights_.rays[i];
+            if (step(flight, ray, group.hits_[i], target, depth, view, group)) {
+                group.next_.push_back(flight, ray);
             }
         }
         // The faint branches of neighbours are neighbours too.
-        group.next_.insert(group.next_.end(), group.faint_.begin(), group.faint_.end());
-        group.flights_.swap(group.next_);
+        group.next_.append(group.faint_);
+        std::swap(group.flights_, group.next_);
     }
 }
 
 /// Flights from the light, of those photons that carry something.
-void PhotonTracer::emit(const PhotonTarget& target, PhotonGroup& group) const {
+void PhotonTracer::emit(const PhotonTarget& target, std::uint32_t view, PhotonGroup& group) const {
     const PhotonEmission emission(scene_, target);
     EmittedLanes& photons = group.emitted_;
     const std::span<const std::uint32_t> indices(group.indices);
@@ -84,42 +85,35 @@ void PhotonTracer::emit(const PhotonTarget& target, PhotonGroup& group) const {
             const Rgb power = photons.power.at(i).array();
             const float initial = power.maxCoeff();
             if (!(initial > 0)) continue;
-            Flight& flight = group.flights_.emplace_back();
-            flight.origin = photons.origin.at(i);
-            flight.direction = photons.direction.at(i);
+            Flight flight;
             flight.power = power;
             flight.initial = initial;
             flight.slot = static_cast<std::uint32_t>(begin) + static_cast<std::uint32_t>(i);
+            group.flights_.push_back(
+                flight, {photons.origin.at(i), photons.direction.at(i), 0.0f, 1e30f, view});
         }
     }
 }
 
 /// What the flights meet. The first surfaces are met side by side; behind them neighbours have
 /// parted, and Embree's packets of such rays cost more than the rays one by one.
-void PhotonTracer::meet(int depth, std::uint32_t view, PhotonGroup& group) const {
+void PhotonTracer::meet(int depth, PhotonGroup& group) const {
     constexpr int kTogether = 4;
-    const std::vector<Flight>& flights = group.flights_;
-    group.hits_.resize(flights.size());
-    if (depth >= kTogether) {
-        for (std::size_t i = 0; i < flights.size(); ++i) {
-            group.hits_[i] =
-                scene_.closest({flights[i].origin, flights[i].direction, 0.0f, 1e30f, view});
-        }
+    const std::vector<Ray>& rays = group.flights_.rays;
+    group.hits_.resize(rays.size());
+    if (depth < kTogether) {
+        scene_.closest(rays, group.hits_);
         return;
     }
-    group.rays_.resize(flights.size());
-    for (std::size_t i = 0; i < flights.size(); ++i) {
-        group.rays_[i] = {flights[i].origin, flights[i].direction, 0.0f, 1e30f, view};
-    }
-    scene_.closest(group.rays_, group.hits_);
+    for (std::size_t i = 0; i < rays.size(); ++i) group.hits_[i] = scene_.closest(rays[i]);
 }
 
 /// Ends the flights that met nothing that counts, and lists the others by what they met.
 void PhotonTracer::sort_out(const PhotonTarget& target, int depth, PhotonGroup& group) const {
     for (auto* list : {&group.glass_, &group.plain_, &group.others_}) list->clear();
     PhotonBalance& balance = group.balance;
-    for (std::size_t i = 0; i < group.flights_.size(); ++i) {
-        const Flight& flight = group.flights_[i];
+    for (std::size_t i = 0; i < group.hits_.size(); ++i) {
+        const Flight& flight = group.flights_.carried[i];
         const Hit& hit = group.hits_[i];
         if (!hit.is_hit()) {
             if (depth > 0 && !flight.has_arrived) balance.escaped += flight.power.sum();
@@ -158,9 +152,10 @@ void PhotonTracer::find_surfaces(std::span<const std::uint32_t> numbers, PhotonG
     PlainLanes& surfaces = group.surfaces_;
     for (int i = 0; i < count; ++i) scene_.prefetch_vertices(group.hits_[numbers[lane(i)]]);
     for (int i = 0; i < count; ++i) {
-        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         const Hit& hit = group.hits_[numbers[lane(i)]];
-        set_hit(surfaces, i, scene_.shape(hit.part), hit, flight.direction);
+        set_hit(surfaces, i, scene_.shape(hit.part), hit,
+                group.flights_.rays[numbers[lane(i)]].direction);
         Rgb power = flight.power;
         if (group.media_.absorbs(flight.medium)) {
             power *= scene_.transmittance(group.media_.media(flight.medium), hit.distance);
@@ -173,7 +168,7 @@ void PhotonTracer::find_surfaces(std::span<const std::uint32_t> numbers, PhotonG
     vitrine::find_surfaces(surfaces, count);
 }
 
-void PhotonTracer::pass_glass(const PhotonTarget& target, int depth,
+void PhotonTracer::pass_glass(const PhotonTarget& target, int depth, std::uint32_t view,
                               std::span<const std::uint32_t> numbers, PhotonGroup& group) const {
     const int count = static_cast<int>(numbers.size());
     PlainLanes& surfaces = group.surfaces_;
@@ -185,7 +180,7 @@ void PhotonTracer::pass_glass(const PhotonTarget& target, int depth,
     surfaces.random.of.fill(1);
     Lane<std::uint32_t> beyond;
     for (int i = 0; i < count; ++i) {
-        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         surfaces.random.index[lane(i)] = group.indices[flight.slot];
         const MediumTable::Crossing crossing = group.media_.cross(
             flight.medium, group.hits_[numbers[lane(i)]].part, surfaces.side[lane(i)] > 0);
@@ -195,21 +190,21 @@ void PhotonTracer::pass_glass(const PhotonTarget& target, int depth,
     }
     random_pairs(surfaces.random, 0, surfaces.u, surfaces.v, count);
     bend_lanes(surfaces, glass, count);
-    branch_lanes(surfaces, scene_.epsilon(), glass, count);
+    branch_lanes(surfaces, glass, count);
     const auto send_on = [&](const Flight& from, const BranchLanes& branch, int i,
-                             std::vector<Flight>& flights) {
-        Flight& flight = flights.emplace_back();
-        flight.origin = branch.origin.at(i);
-        flight.direction = branch.direction.at(i);
+                             PhotonGroup::Flights& flights) {
+        const bool is_refracted = branch.is_refracted[lane(i)] != 0;
+        // `RenderScene::leave`: a refracted ray always leaves for below, a reflected one for above.
+        const float side = is_refracted ? -scene_.epsilon() : scene_.epsilon();
+        flights.rays.push_back({surfaces.position.at(i) + side * surfaces.geometric.at(i),
+                                (is_refracted ? glass.refracted : glass.reflected).at(i), 0.0f,
+                                1e30f, view});
+        Flight& flight = flights.carried.emplace_back(from);
         flight.power = branch.power.at(i).array();
-        flight.initial = from.initial;
-        flight.slot = from.slot;
-        flight.medium = branch.is_refracted[lane(i)] ? beyond[lane(i)] : from.medium;
-        flight.is_glossy = from.is_glossy;
-        flight.has_arrived = from.has_arrived;
+        if (is_refracted) flight.medium = beyond[lane(i)];
     };
     for (int i = 0; i < count; ++i) {
-        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         if (!flight.has_arrived) group.balance.chance += glass.chance[lane(i)];
         if (glass.strong.is_open[lane(i)]) send_on(flight, glass.strong, i, group.next_);
         if (glass.faint.is_open[lane(i)]) send_on(flight, glass.faint, i, group.faint_);
@@ -222,13 +217,13 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
     PlainLanes& surfaces = group.surfaces_;
     find_surfaces(numbers, group);
     for (int i = 0; i < count; ++i) {
-        const Flight& flight = group.flights_[numbers[lane(i)]];
+        const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         const Hit& hit = group.hits_[numbers[lane(i)]];
         Photon& photon =
             group.arrivals.emplace_back(receivers_[static_cast<std::size_t>(hit.part)].photon);
         photon.position = surfaces.position.at(i);
         photon.power = surfaces.throughput.at(i).array();
-        photon.to_light = PackedDirection(-flight.direction);
+        photon.to_light = PackedDirection(-surfaces.direction.at(i));
         photon.normal = PackedDirection(surfaces.geometric.at(i));
         if (!scene_.shape(hit.part).has_one_albedo) {
             photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
@@ -241,9 +236,9 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
 }
 
 /// Surfaces of other kinds; false when the flight ends.
-bool PhotonTracer::step(Flight& flight, const Hit& hit, const PhotonTarget& target, int depth,
-                        std::uint32_t view, PhotonGroup& group) const {
-    const ShadingPoint point = scene_.surface(hit, flight.direction);
+bool PhotonTracer::step(Flight& flight, Ray& ray, const Hit& hit, const PhotonTarget& target,
+                        int depth, std::uint32_t view, PhotonGroup& group) const {
+    const ShadingPoint point = scene_.surface(hit, ray.direction);
     if (group.media_.absorbs(flight.medium)) {
         absorb(flight, scene_.transmittance(group.media_.media(flight.medium), hit.distance),
                group.balance);
@@ -251,15 +246,15 @@ bool PhotonTracer::step(Flight& flight, const Hit& hit, const PhotonTarget& targ
     const Bsdf bsdf = scene_.bsdf(point, hit);
     if (is_smooth(bsdf)) {
         absorb(flight, std::get<MirrorBsdf>(bsdf).reflectance, group.balance);
-        flight.direction = mirror_direction(point, flight.direction);
-        flight.origin = scene_.leave(point, flight.direction);
+        ray.direction = mirror_direction(point, ray.direction);
+        ray.origin = scene_.leave(point, ray.direction);
         return (flight.power > 0).any();
     }
     if (depth > 0) {
         Photon& photon = group.arrivals.emplace_back();
         photon.position = point.position;
         photon.power = flight.power;
-        photon.to_light = PackedDirection(-flight.direction);
+        photon.to_light = PackedDirection(-ray.direction);
         photon.normal = PackedDirection(point.geometric_normal);
         photon.set_diffuse_albedo(diffuse_reflectance(bsdf));
         photon.views = static_cast<std::uint8_t>(view);
@@ -270,22 +265,22 @@ bool PhotonTracer::step(Flight& flight, const Hit& hit, const PhotonTarget& targ
         flight.has_arrived = true;
     }
     if (!(lobe_probability(bsdf, Lobe::Glossy) > 0)) return false;
-    return scatter(flight, point, bsdf, depth, {target.key, group.indices[flight.slot]},
+    return scatter(flight, ray, point, bsdf, depth, {target.key, group.indices[flight.slot]},
                    group.balance);
 }
 
-bool PhotonTracer::scatter(Flight& flight, const ShadingPoint& point, const Bsdf& bsdf, int depth,
-                           const PathSampler& sampler, PhotonBalance& balance) const {
+bool PhotonTracer::scatter(Flight& flight, Ray& ray, const ShadingPoint& point, const Bsdf& bsdf,
+                           int depth, const PathSampler& sampler, PhotonBalance& balance) const {
     const Frame frame(point.shading_normal);
-    const Vec3f wo = frame.to_local(-flight.direction);
+    const Vec3f wo = frame.to_local(-ray.direction);
     BsdfSample s = sample(bsdf, wo, sampler.pair(depth, kScatterUse), 0x1.fffffep-1f);
     s.weight *= lobe_probability(bsdf, Lobe::Glossy);
     const Vec3f direction = frame.to_world(s.wi);
     if (direction.dot(point.geometric_normal) <= 0) s.weight = Rgb::Zero();
     absorb(flight, s.weight, balance);
     if (!(flight.power > 0).any()) return false;
-    flight.direction = direction;
-    flight.origin = scene_.leave(point, direction);
+    ray.direction = direction;
+    ray.origin = scene_.leave(point, direction);
     flight.is_glossy = true;
     const float survival = flight.power.maxCoeff() / (flight.initial * kSurePower);
     if (survival >= 1) return true;

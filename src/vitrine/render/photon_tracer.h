@@ -26,10 +26,9 @@ class PhotonGroup {
   private:
     friend class PhotonTracer;
 
-    /// One ray under way.
+    /// What a ray under way carries.
     struct Flight {
-        Vec3f origin, direction;
-        Rgb power;
+        Rgb power = Rgb::Zero();
         float initial = 0;       // power of the photon at first, of its strongest channel
         std::uint32_t slot = 0;  // of the photon in its group
         std::uint32_t medium = 0;
@@ -37,8 +36,25 @@ class PhotonGroup {
         bool has_arrived = false;  // stored at a receiver before: later stores are no new power
     };
 
-    std::vector<Flight> flights_, next_, faint_;
-    std::vector<Ray> rays_;
+    struct Flights {
+        std::vector<Flight> carried;
+        std::vector<Ray> rays;  // apart, as they are asked for together
+
+        void clear() {
+            carried.clear();
+            rays.clear();
+        }
+        void push_back(const Flight& flight, const Ray& ray) {
+            carried.push_back(flight);
+            rays.push_back(ray);
+        }
+        void append(const Flights& others) {
+            carried.insert(carried.end(), others.carried.begin(), others.carried.end());
+            rays.insert(rays.end(), others.rays.begin(), others.rays.end());
+        }
+    };
+
+    Flights flights_, next_, faint_;
     std::vector<Hit> hits_;
     std::vector<std::uint32_t> glass_, plain_, others_;  // numbers of the flights that met such
     MediumTable media_;
@@ -66,17 +82,17 @@ class PhotonTracer {
         Photon photon;  // what all that arrive there share
     };
 
-    void emit(const PhotonTarget& target, PhotonGroup& group) const;
-    void meet(int depth, std::uint32_t view, PhotonGroup& group) const;
+    void emit(const PhotonTarget& target, std::uint32_t view, PhotonGroup& group) const;
+    void meet(int depth, PhotonGroup& group) const;
     void sort_out(const PhotonTarget& target, int depth, PhotonGroup& group) const;
     void find_surfaces(std::span<const std::uint32_t> numbers, PhotonGroup& group) const;
-    void pass_glass(const PhotonTarget& target, int depth, std::span<const std::uint32_t> numbers,
-                    PhotonGroup& group) const;
+    void pass_glass(const PhotonTarget& target, int depth, std::uint32_t view,
+                    std::span<const std::uint32_t> numbers, PhotonGroup& group) const;
     void store_plain(std::uint32_t view, std::span<const std::uint32_t> numbers,
                      PhotonGroup& group) const;
-    bool step(Flight& flight, const Hit& hit, const PhotonTarget& target, int depth,
+    bool step(Flight& flight, Ray& ray, const Hit& hit, const PhotonTarget& target, int depth,
               std::uint32_t view, PhotonGroup& group) const;
-    bool scatter(Flight& flight, const ShadingPoint& point, const Bsdf& bsdf, int depth,
+    bool scatter(Flight& flight, Ray& ray, const ShadingPoint& point, const Bsdf& bsdf, int depth,
                  const PathSampler& sampler, PhotonBalance& balance) const;
 
     const RenderScene& scene_;
