@@ -11,22 +11,22 @@ float balance(float a, float b) { return a + b > 0 ? a / (a + b) : 0.0f; }
 
 }  // namespace
 
-void PathTracer::add_emission(const State& state, float distance, Sink sink) const {
+void PathTracer::add_emission(const State& state, const RayAndHit& ray, Sink sink) const {
     if (state.is_covered) return;
     const LightSampler& lights = scene_.lights();
+    const Vec3f &origin = ray.ray.origin, &direction = ray.ray.direction;
     for (const std::size_t i : lights.lamps()) {
-        const auto hit = lights.hit(i, state.origin, state.direction, distance);
+        const auto hit = lights.hit(i, origin, direction, ray.distance());
         if (!hit) continue;
         float weight = 1.0f;
         if (state.pdf > 0) {
-            weight =
-                balance(state.pdf, lights.pdf(i, state.receiver, state.direction, hit->distance));
+            weight = balance(state.pdf, lights.pdf(i, origin, direction, hit->distance));
         }
         sink.add(state, state.layer, state.throughput * hit->radiance * weight);
     }
 }
 
-void PathTracer::add_environment(const State& state, Sink sink) const {
+void PathTracer::add_environment(const State& state, const RayAndHit& ray, Sink sink) const {
     const LightSampler& lights = scene_.lights();
     Rgb radiance =
         options_.direct_light_only && state.has_receiver ? Rgb(Rgb::Zero()) : lights.ambient();
@@ -34,9 +34,10 @@ void PathTracer::add_environment(const State& state, Sink sink) const {
         for (const std::size_t i : lights.environments()) {
             float weight = 1.0f;
             if (state.pdf > 0) {
-                weight = balance(state.pdf, lights.pdf(i, state.receiver, state.direction, 1e30f));
+                weight =
+                    balance(state.pdf, lights.pdf(i, ray.ray.origin, ray.ray.direction, 1e30f));
             }
-            radiance += lights.environment_radiance(i, state.direction) * weight;
+            radiance += lights.environment_radiance(i, ray.ray.direction) * weight;
         }
     }
     // An environment seen from the first surface is direct light, whatever its layer says by now.
@@ -45,17 +46,19 @@ void PathTracer::add_environment(const State& state, Sink sink) const {
 }
 
 void PathTracer::add_shadows(Wave& wave) const {
-    if (wave.shadows.empty()) return;
-    scene_.occluded(wave.shadow_rays, wave.hidden);
+    scene_.occluded(wave.shadow_rays);
     for (std::size_t i = 0; i < wave.shadows.size(); ++i) {
         const ShadowRay& shadow = wave.shadows[i];
+        const BareRay& ray = wave.shadow_rays[i];
         std::uint32_t lit = shadow.views;
-        if (wave.hidden[i]) {
+        if (ray.is_hidden()) {
             if (shadow.views != kAllParts) continue;
             // What a virtual part hides may lie open in the scene without.
-            Ray ray = wave.shadow_rays[i];
-            ray.mask = lit = kRealParts;
-            if (scene_.is_occluded(ray)) continue;
+            lit = kRealParts;
+            if (scene_.is_occluded(
+                    {ray.origin, ray.direction, 0.0f, shadow.distance, kRealParts})) {
+                continue;
+            }
         }
         Sink sink{wave.results[shadow.path]};
         if (lit != shadow.path_views) sink.part();
@@ -77,7 +80,7 @@ void PathTracer::Wave::sort_shadows(std::size_t first, int lane_count) {
     std::partial_sum(place.begin(), place.end(), place.begin());
     const auto at = static_cast<std::ptrdiff_t>(first);
     const std::vector<ShadowRay> old(shadows.begin() + at, shadows.end());
-    const std::vector<Ray> old_rays(shadow_rays.begin() + at, shadow_rays.end());
+    const std::vector<BareRay> old_rays(shadow_rays.begin() + at, shadow_rays.end());
     for (std::size_t k = 0; k < old.size(); ++k) {
         const std::size_t to = first + place[static_cast<std::size_t>(shadow_lanes[k])]++;
         shadows[to] = old[k];
@@ -92,7 +95,7 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
     const PathSampler& sampler = wave.task(state).sample.sampler;
     if (lights.count() == 0) return;
     // All lights at the surface seen; one of them, by turns of chance, at those behind it.
-    const bool takes_all = state.is_first_receiver || lights.count() == 1;
+    const bool takes_all = !state.has_receiver || lights.count() == 1;
     std::size_t begin = 0, end = lights.count();
     float boost = 1.0f;
     if (!takes_all) {
@@ -116,7 +119,7 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
             if (!(value > 0).any()) continue;
             wave.add_shadow(state, state.views, state.layer,
                             state.throughput * value * s->radiance_over_pdf * (scale * wi.z()),
-                            {origin, s->direction, 0.0f, s->distance * (1 - 1e-4f)});
+                            origin, s->direction, s->distance);
         }
     }
 }
@@ -140,10 +143,11 @@ Rgb PathTracer::direct_value(const State& state, const Bsdf& bsdf, const Vec3f& 
     return value;
 }
 
-void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                              const Frame& frame, const Vec3f& wo, Sink sink) const {
+void PathTracer::add_caustics(const State& state, const ShadingPoint& point, const Vec3f& from,
+                              const Bsdf& bsdf, const Frame& frame, const Vec3f& wo,
+                              Sink sink) const {
     if (!caustics_ || caustics_->empty()) return;
-    if (state.is_diffuse_segment && (point.position - state.receiver).norm() >= caustics_->near_m) {
+    if (state.is_diffuse_segment && (point.position - from).norm() >= caustics_->near_m) {
         return;  // known from the secondary lights
     }
     const bool is_translucent = std::holds_alternative<TranslucentBsdf>(bsdf);
@@ -184,9 +188,9 @@ void PathTracer::add_caustics(const State& state, const ShadingPoint& point, con
         caustics_->soft.gather(point.position, point.geometric_normal, visit);
     }
     const Rgb value = eval_lobe(bsdf, Lobe::Diffuse, wo, Vec3f(0, 0, 1));
-    const Layer layer = state.is_layer_fixed      ? state.layer
-                        : state.is_first_receiver ? Layer::Caustics
-                                                  : Layer::Diffuse;
+    const Layer layer = state.is_layer_fixed  ? state.layer
+                        : !state.has_receiver ? Layer::Caustics
+                                              : Layer::Diffuse;
     const auto reflected = [&](const Sums& sums) -> Rgb {
         return state.throughput * (sums.irradiance * value + sums.glossy);
     };
@@ -237,8 +241,8 @@ void PathTracer::add_secondary(const State& state, const ShadingPoint& point, co
     const auto probability = static_cast<float>(caustics_->secondary_choice.probability(index));
     const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
-    wave.add_shadow(state, views, layer, state.throughput * value * light.flux * geometry,
-                    {origin, direction, 0.0f, distance * (1 - 1e-4f)});
+    wave.add_shadow(state, views, layer, state.throughput * value * light.flux * geometry, origin,
+                    direction, distance);
 }
 
 }  // namespace vitrine

@@ -33,23 +33,23 @@ std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
 }
 
 void PathTracer::shade_plain(Wave& wave) const {
-    const std::span<const PlainHit> all(wave.plain);
+    const std::span<const Meeting> all(wave.plain);
     for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
         shade_plain(wave, all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
     }
     wave.plain.clear();
 }
 
-void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
+void PathTracer::shade_plain(Wave& wave, std::span<const Meeting> hits) const {
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
     for (int i = 0; i < count; ++i) {
         State& state = *hits[lane(i)].state;
-        const Hit& hit = *hits[lane(i)].hit;
-        const PartShape& shape = scene_.shape(hit.part);
-        set_hit(lanes, i, shape, hit, state.direction);
+        const RayAndHit& ray = *hits[lane(i)].ray;
+        const PartShape& shape = scene_.shape(ray.part);
+        set_hit(lanes, i, shape, ray, ray.ray.direction);
         lanes.albedo.set(
-            i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(hit.part, hit));
+            i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(ray.part, hit_of(ray)));
         lanes.throughput.set(i, state.throughput);
         const PathSampler& sampler = wave.task(state).sample.sampler;
         lanes.random.stream[lane(i)] = sampler.mixed_stream();
@@ -59,9 +59,10 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
             !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces ? 1
                                                                                                 : 0;
         if (!state.is_layer_fixed) {
-            state.layer = state.is_first_receiver ? Layer::Shadow : Layer::Diffuse;
+            state.layer = state.has_receiver ? Layer::Diffuse : Layer::Shadow;
         }
     }
+    normalize_facets(lanes, count);
     find_surfaces(lanes, count);
     find_origins(lanes, scene_.epsilon(), count);
     add_direct(wave, hits);
@@ -71,13 +72,13 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
         const DiffuseBsdf bsdf{lanes.albedo.at(i).array()};
         ShadingPoint point;
         if (caustics_) {
-            point.part = hits[lane(i)].hit->part;
+            point.part = hits[lane(i)].ray->part;
             point.position = lanes.position.at(i);
             point.smooth_position = lanes.smooth.at(i);
             point.geometric_normal = lanes.geometric.at(i);
             point.shading_normal = lanes.shading.at(i);
-            add_caustics(state, point, bsdf, Frame(point.shading_normal), Vec3f(0, 0, 1),
-                         wave.sink(state));
+            add_caustics(state, point, hits[lane(i)].ray->ray.origin, bsdf,
+                         Frame(point.shading_normal), Vec3f(0, 0, 1), wave.sink(state));
         }
         if (is_open[lane(i)] && !state.has_receiver && !state.is_layer_fixed) {
             wave.sink(state).each(state.views, [&](PathResult& result) {
@@ -94,7 +95,7 @@ void PathTracer::shade_plain(Wave& wave, std::span<const PlainHit> hits) const {
     scatter(wave, hits, is_open);
 }
 
-void PathTracer::add_direct(Wave& wave, std::span<const PlainHit> hits) const {
+void PathTracer::add_direct(Wave& wave, std::span<const Meeting> hits) const {
     const LightSampler& lights = scene_.lights();
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
@@ -134,8 +135,7 @@ void PathTracer::add_direct(Wave& wave, std::span<const PlainHit> hits) const {
                 if (!(lanes.lit[lane(i)] > 0) || k >= lanes.random.of[lane(i)]) continue;
                 if (has_choice && state.has_receiver && picked[lane(i)] != light) continue;
                 wave.add_shadow(state, state.views, state.layer, lanes.light.at(i).array(),
-                                {lanes.origin.at(i), lanes.to_light.at(i), 0.0f,
-                                 lanes.distance[lane(i)] * (1 - 1e-4f)});
+                                lanes.origin.at(i), lanes.to_light.at(i), lanes.distance[lane(i)]);
                 wave.shadow_lanes.push_back(i);
             }
         }
@@ -143,7 +143,7 @@ void PathTracer::add_direct(Wave& wave, std::span<const PlainHit> hits) const {
     if (wave.shadow_lanes.size() > hits.size()) wave.sort_shadows(first_shadow, count);
 }
 
-void PathTracer::scatter(Wave& wave, std::span<const PlainHit> hits,
+void PathTracer::scatter(Wave& wave, std::span<const Meeting> hits,
                          const Lane<std::uint32_t>& is_open) const {
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
@@ -153,17 +153,23 @@ void PathTracer::scatter(Wave& wave, std::span<const PlainHit> hits,
     lanes.random.use.fill(kScatterUse);
     random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
     scatter_lanes(lanes, count);
+    const auto has_receiver = [](const Meeting& hit) { return hit.state->has_receiver; };
+    if (std::any_of(hits.begin(), hits.end(), has_receiver)) {
+        lanes.random.use.fill(kRouletteUse);
+        random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
+    }
     for (int i = 0; i < count; ++i) {
         if (!is_open[lane(i)] || !(lanes.open[lane(i)] > 0)) continue;
-        // Copied before it is written to: what was just written would have to be waited for.
-        State& state = wave.next.emplace_back(*hits[lane(i)].state);
-        state.throughput = lanes.throughput.at(i).array();
-        const BsdfSample scattered{lanes.scattered.at(i), Rgb::Ones(),
-                                   lanes.scattered_pdf[lane(i)]};
-        const PathSampler& sampler = wave.task(state).sample.sampler;
-        if (!send_on(state, scattered, scattered.wi, lanes.origin.at(i), sampler)) {
-            wave.next.pop_back();
+        const State& state = *hits[lane(i)].state;
+        Rgb throughput = lanes.throughput.at(i).array();
+        if (state.has_receiver) {
+            const float survival = survival_of(throughput);
+            if (lanes.u[lane(i)] >= survival) continue;
+            throughput /= survival;
         }
+        State& next = wave.add(state, lanes.origin.at(i), lanes.scattered.at(i));
+        next.throughput = throughput;
+        next.leave_receiver(Lobe::Diffuse, lanes.scattered_pdf[lane(i)], caustics_ != nullptr);
     }
 }
 

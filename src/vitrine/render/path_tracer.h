@@ -135,29 +135,34 @@ class PathTracer {
     struct Sink;
     struct ShadowRay;
     struct Wave;
-    struct PlainHit;
+    struct Meeting;
     void start(const Vec3f& origin, std::uint32_t views, Wave& wave) const;
     /// Follows all paths of the wave to their ends.
     void finish(Wave& wave) const;
-    Hit closest(const State& state) const;
-    void find_hits(Wave& wave) const;
-    /// What `hit` of the state's ray brings; what goes on from there is added to the wave's next.
-    void step(State& state, const Hit& hit, Wave& wave) const;
-    /// What the wave's hits of plain diffuse surfaces bring, many side by side.
+    /// What the path's ray has met, in one scene or in both.
+    void meet(State& state, const RayAndHit& ray, Wave& wave) const;
+    /// What that brings; what goes on from there is added to the wave's next. Plain surfaces wait.
+    void step(State& state, const RayAndHit& ray, Wave& wave) const;
+    void pass_mirror(const State& state, const ShadingPoint& point, const RayAndHit& ray,
+                     const Rgb& reflectance, Wave& wave) const;
+    void pass_interface(const State& state, const ShadingPoint& point, const RayAndHit& ray,
+                        Wave& wave) const;
+    /// What the plain diffuse surfaces bring that the wave has met, many side by side.
     void shade_plain(Wave& wave) const;
-    void shade_plain(Wave& wave, std::span<const PlainHit> hits) const;
-    void add_direct(Wave& wave, std::span<const PlainHit> hits) const;
-    void scatter(Wave& wave, std::span<const PlainHit> hits,
+    void shade_plain(Wave& wave, std::span<const Meeting> hits) const;
+    void add_direct(Wave& wave, std::span<const Meeting> hits) const;
+    void scatter(Wave& wave, std::span<const Meeting> hits,
                  const Lane<std::uint32_t>& is_open) const;
-    void add_emission(const State& state, float distance, Sink sink) const;
-    void add_environment(const State& state, Sink sink) const;
+    void add_emission(const State& state, const RayAndHit& ray, Sink sink) const;
+    void add_environment(const State& state, const RayAndHit& ray, Sink sink) const;
     void add_direct(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                     const Frame& frame, const Vec3f& wo, int light_samples, Wave& wave) const;
     /// Of the lobes towards a light that was picked with a density (0: a light without size).
     Rgb direct_value(const State& state, const Bsdf& bsdf, const Vec3f& wo, const Vec3f& wi,
                      float light_pdf) const;
-    void add_caustics(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
-                      const Frame& frame, const Vec3f& wo, Sink sink) const;
+    /// @param from start of the ray that met the point
+    void add_caustics(const State& state, const ShadingPoint& point, const Vec3f& from,
+                      const Bsdf& bsdf, const Frame& frame, const Vec3f& wo, Sink sink) const;
     void add_exitance(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                       const Vec3f& wo, Sink sink) const;
     void add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
@@ -165,19 +170,16 @@ class PathTracer {
     /// Light of the wave's shadow rays that arrives.
     void add_shadows(Wave& wave) const;
     std::size_t pick_light(const State& state, const PathSampler& sampler) const;
-    bool scatter(State& state, const ShadingPoint& point, const Bsdf& bsdf, const Frame& frame,
-                 const Vec3f& wo, const PathSampler& sampler) const;
-    /// Sends the path on from a receiver, unless chance ends it.
-    /// @param direction of `s.wi` in the world
-    bool send_on(State& state, const BsdfSample& s, const Vec3f& direction, const Vec3f& origin,
-                 const PathSampler& sampler) const;
-    void pass_interface(const State& state, const ShadingPoint& point, Wave& wave) const;
+    void scatter(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
+                 const Frame& frame, const Vec3f& wo, Wave& wave) const;
 
     const RenderScene& scene_;
     const CausticMaps* caustics_;
     PathOptions options_;
     const TranslucentLight* translucent_;
     bool has_virtual_;
+    bool has_lamps_;                                     // that a ray can meet
+    bool has_background_;                                // that a ray can meet, behind all parts
     std::vector<std::optional<LaneLight>> lane_lights_;  // discs and points
 };
 

@@ -29,6 +29,19 @@ inline float unit_float(std::uint32_t bits) {
 
 }  // namespace
 
+VITRINE_WIDE void normalize_facets(PlainLanes& lanes, int count) {
+    const int n = whole_steps(count);
+    Lanes3& facet = lanes.facet;
+    for (int i = 0; i < n; ++i) {
+        const float x = facet.x[i], y = facet.y[i], z = facet.z[i];
+        const float square = dot(x, y, z, x, y, z);
+        const float length = square > 0 ? std::sqrt(square) : 1.0f;
+        facet.x[i] = x / length;
+        facet.y[i] = y / length;
+        facet.z[i] = z / length;
+    }
+}
+
 VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
     const int n = whole_steps(count);
     Lane<float>& side = lanes.side;

@@ -77,7 +77,9 @@ struct PlainLanes {
 };
 
 /// Puts what a ray met into a lane.
-inline void set_hit(PlainLanes& lanes, int i, const PartShape& shape, const Hit& hit,
+/// @param hit a Hit or a RayAndHit
+template <typename AnyHit>
+inline void set_hit(PlainLanes& lanes, int i, const PartShape& shape, const AnyHit& hit,
                     const Vec3f& direction) {
     const auto k = static_cast<std::size_t>(i);
     const Triangle& triangle = shape.triangles[hit.triangle];
@@ -94,6 +96,8 @@ inline void set_hit(PlainLanes& lanes, int i, const PartShape& shape, const Hit&
 
 // All that follow work on the first `count` lanes, rounded up to whole steps.
 
+/// Gives the geometric normals of what was met unit length.
+void normalize_facets(PlainLanes& lanes, int count);
 /// Fills side, position, geometric, shading from what was met.
 void find_surfaces(PlainLanes& lanes, int count);
 /// Then smooth and origin.

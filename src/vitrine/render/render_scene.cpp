@@ -173,12 +173,24 @@ void RenderScene::closest(std::span<const Ray> rays, std::span<Hit> hits) const 
     }
 }
 
-void RenderScene::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const {
-    accel_.occluded(rays, occluded);
-    if (added_accel_.empty() || !(rays.front().mask & kVirtualParts)) return;
-    std::vector<std::uint8_t> added;
-    added_accel_.occluded(rays, added);
-    for (std::size_t i = 0; i < rays.size(); ++i) occluded[i] |= added[i];
+void RenderScene::add_closest(std::span<RayAndHit> rays, bool are_alike) const {
+    std::vector<std::int32_t> met;
+    met.reserve(rays.size());
+    for (RayAndHit& ray : rays) {
+        met.push_back(ray.part);
+        ray.part = -1;
+    }
+    added_accel_.closest(rays, are_alike);
+    const auto first = static_cast<std::int32_t>(accel_.parts().size());
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        rays[i].part = rays[i].is_hit() ? first + rays[i].part : met[i];
+    }
+}
+
+void RenderScene::occluded(std::span<BareRay> rays) const {
+    accel_.occluded(rays);
+    // Rays that are answered already (negative) end before they begin: they stay what they are.
+    if (!added_accel_.empty()) added_accel_.occluded(rays);
 }
 
 bool RenderScene::has_bodies() const {
@@ -194,17 +206,6 @@ Rgb RenderScene::transmittance(const Media& media, float distance) const {
     const Dielectric* medium = dielectric(media.current());
     if (!medium || (medium->sigma_a_per_m == 0).all()) return Rgb::Ones();
     return (-medium->sigma_a_per_m * distance).exp();
-}
-
-void RenderScene::prefetch_vertices(const Hit& hit) const {
-    if (!hit.is_hit()) return;
-    const PartShape& s = shape(hit.part);
-    const Triangle& t = s.triangles[hit.triangle];
-    for (int k = 0; k < 3; ++k) {
-        __builtin_prefetch(s.vertices + t[k]);
-        if (s.normals) __builtin_prefetch(s.normals + t[k]);
-        if (s.colours) __builtin_prefetch(s.colours + t[k]);
-    }
 }
 
 ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) const {

@@ -88,12 +88,16 @@ class RenderScene {
     }
     /// Of many rays; see `Accel::closest`.
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
+    void closest(std::span<RayAndHit> rays, bool are_alike) const {
+        accel_.closest(rays, are_alike);
+        if (!added_accel_.empty()) add_closest(rays, are_alike);
+    }
     bool is_occluded(const Ray& ray) const {
         if (accel_.is_occluded(ray)) return true;
         return !added_accel_.empty() && (ray.mask & kVirtualParts) && added_accel_.is_occluded(ray);
     }
-    /// Of many rays of one mask; see `Accel::occluded`.
-    void occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const;
+    /// Of many rays; see `Accel::occluded`.
+    void occluded(std::span<BareRay> rays) const;
     /// As `Accel::nearest`.
     Hit nearest(const Vec3f& point, float max_distance) const {
         const Hit hit = accel_.nearest(point, max_distance);
@@ -131,11 +135,22 @@ class RenderScene {
 
     /// Asks memory for what `surface` and `bsdf` will read; the second needs what the first asks
     /// for.
-    void prefetch_triangle(const Hit& hit) const {
-        if (!hit.is_hit()) return;
-        __builtin_prefetch(shape(hit.part).triangles + hit.triangle);
+    /// @param hit a Hit or a RayAndHit
+    template <typename AnyHit>
+    void prefetch_triangle(const AnyHit& hit) const {
+        if (hit.is_hit()) __builtin_prefetch(shape(hit.part).triangles + hit.triangle);
     }
-    void prefetch_vertices(const Hit& hit) const;
+    template <typename AnyHit>
+    void prefetch_vertices(const AnyHit& hit) const {
+        if (!hit.is_hit()) return;
+        const PartShape& s = shape(hit.part);
+        const Triangle& t = s.triangles[hit.triangle];
+        for (int k = 0; k < 3; ++k) {
+            __builtin_prefetch(s.vertices + t[k]);
+            if (s.normals) __builtin_prefetch(s.normals + t[k]);
+            if (s.colours) __builtin_prefetch(s.colours + t[k]);
+        }
+    }
     /// The surface that `hit` of a ray found.
     ShadingPoint surface(const Hit& hit, const Vec3f& ray_direction) const;
     /// Scattering of an opaque or mirror part at a point; dielectrics need the media and are not
@@ -157,6 +172,8 @@ class RenderScene {
 
   private:
     void measure_parts();
+    /// What rays meet of the parts added later, if it is nearer than what they have met.
+    void add_closest(std::span<RayAndHit> rays, bool are_alike) const;
 
     Scene scene_;
     Accel accel_;

@@ -5,6 +5,7 @@
 #include <embree3/rtcore.h>
 
 #include <array>
+#include <cstddef>
 #include <limits>
 
 namespace vitrine {
@@ -27,21 +28,30 @@ void throw_on_error(void*, RTCError code, const char* text) {
                                    text ? text : ""));
 }
 
-RTCRay to_embree(const Ray& ray) {
-    RTCRay r;
-    r.org_x = ray.origin.x();
-    r.org_y = ray.origin.y();
-    r.org_z = ray.origin.z();
-    r.dir_x = ray.direction.x();
-    r.dir_y = ray.direction.y();
-    r.dir_z = ray.direction.z();
-    r.tnear = ray.min_distance;
-    r.tfar = ray.max_distance;
-    r.time = 0.0f;
-    r.mask = ray.mask;
-    r.id = 0;
-    r.flags = 0;
-    return r;
+static_assert(sizeof(BareRay) == sizeof(RTCRay) && alignof(BareRay) == alignof(RTCRay));
+static_assert(offsetof(BareRay, direction) == offsetof(RTCRay, dir_x));
+static_assert(offsetof(BareRay, max_distance) == offsetof(RTCRay, tfar));
+static_assert(offsetof(BareRay, mask) == offsetof(RTCRay, mask));
+static_assert(sizeof(RayAndHit) == sizeof(RTCRayHit) && alignof(RayAndHit) == alignof(RTCRayHit));
+static_assert(offsetof(RayAndHit, normal) == offsetof(RTCRayHit, hit.Ng_x));
+static_assert(offsetof(RayAndHit, barycentric) == offsetof(RTCRayHit, hit.u));
+static_assert(offsetof(RayAndHit, triangle) == offsetof(RTCRayHit, hit.primID));
+static_assert(offsetof(RayAndHit, part) == offsetof(RTCRayHit, hit.geomID));
+static_assert(offsetof(RayAndHit, instance) == offsetof(RTCRayHit, hit.instID));
+
+RTCRay* to_embree(BareRay* rays) { return reinterpret_cast<RTCRay*>(rays); }
+RTCRayHit* to_embree(RayAndHit* rays) { return reinterpret_cast<RTCRayHit*>(rays); }
+
+BareRay bare(const Ray& ray) {
+    BareRay result(ray.origin, ray.direction, ray.max_distance, ray.mask);
+    result.min_distance = ray.min_distance;
+    return result;
+}
+
+RayAndHit start_of(const Ray& ray) {
+    RayAndHit result;
+    result.ray = bare(ray);
+    return result;
 }
 
 void self_test(RTCDevice device) {
@@ -66,12 +76,10 @@ void self_test(RTCDevice device) {
     for (const std::uint32_t mask : {2u, 4u}) {
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
-        RTCRayHit hit;
-        hit.ray = to_embree({Vec3f::Zero(), Vec3f(0, 0, 1), 0.0f, 10.0f, mask});
-        hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        rtcIntersect1(scene, &context, &hit);
-        const bool did_hit = hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-        is_right &= did_hit == (mask == 2u) && (!did_hit || std::abs(hit.ray.tfar - 1.0f) < 1e-5f);
+        RayAndHit ray = start_of({Vec3f::Zero(), Vec3f(0, 0, 1), 0.0f, 10.0f, mask});
+        rtcIntersect1(scene, &context, to_embree(&ray));
+        is_right &= ray.is_hit() == (mask == 2u) &&
+                    (!ray.is_hit() || std::abs(ray.distance() - 1.0f) < 1e-5f);
     }
     rtcReleaseScene(scene);
     if (!is_right) {
@@ -118,83 +126,55 @@ Accel::Accel(std::vector<AccelPart> parts) : parts_(std::move(parts)) {
     impl_ = std::move(impl);
 }
 
-namespace {
-
-RTCRayHit start_of(const Ray& ray) {
-    RTCRayHit hit;
-    hit.ray = to_embree(ray);
-    hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    return hit;
-}
-
-Hit end_of(const RTCRayHit& hit) {
-    Hit result;
-    if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return result;
-    result.distance = hit.ray.tfar;
-    result.part = static_cast<int>(hit.hit.geomID);
-    result.triangle = static_cast<int>(hit.hit.primID);
-    result.barycentric = Vec2f(hit.hit.u, hit.hit.v);
-    result.normal = Vec3f(hit.hit.Ng_x, hit.hit.Ng_y, hit.hit.Ng_z).normalized();
-    return result;
-}
-
-}  // namespace
-
 Hit Accel::closest(const Ray& ray) const {
     if (!impl_) return {};
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    RTCRayHit hit = start_of(ray);
-    rtcIntersect1(impl_->scene, &context, &hit);
-    return end_of(hit);
+    RayAndHit answer = start_of(ray);
+    rtcIntersect1(impl_->scene, &context, to_embree(&answer));
+    return hit_of(answer);
 }
 
 void Accel::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
     VITRINE_CHECK_EQ(rays.size(), hits.size());
-    if (!impl_) {
-        std::fill(hits.begin(), hits.end(), Hit());
-        return;
-    }
     constexpr std::size_t kStream = 64;  // rays that Embree sorts into packets at once
-    std::array<RTCRayHit, kStream> stream;
+    std::array<RayAndHit, kStream> stream;
     for (std::size_t begin = 0; begin < rays.size(); begin += kStream) {
         const std::size_t count = std::min(kStream, rays.size() - begin);
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         for (std::size_t i = 0; i < count; ++i) stream[i] = start_of(rays[begin + i]);
-        rtcIntersect1M(impl_->scene, &context, stream.data(), static_cast<unsigned>(count),
-                       sizeof(RTCRayHit));
-        for (std::size_t i = 0; i < count; ++i) hits[begin + i] = end_of(stream[i]);
+        closest(std::span(stream).first(count), true);
+        for (std::size_t i = 0; i < count; ++i) hits[begin + i] = hit_of(stream[i]);
     }
+}
+
+void Accel::closest(std::span<RayAndHit> rays, bool are_alike) const {
+    if (!impl_ || rays.empty()) return;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    if (are_alike) {
+        context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+        rtcIntersect1M(impl_->scene, &context, to_embree(rays.data()),
+                       static_cast<unsigned>(rays.size()), sizeof(RayAndHit));
+        return;
+    }
+    for (RayAndHit& ray : rays) rtcIntersect1(impl_->scene, &context, to_embree(&ray));
 }
 
 bool Accel::is_occluded(const Ray& ray) const {
     if (!impl_) return false;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    RTCRay r = to_embree(ray);
-    rtcOccluded1(impl_->scene, &context, &r);
-    return r.tfar < 0.0f;
+    BareRay answer = bare(ray);
+    rtcOccluded1(impl_->scene, &context, to_embree(&answer));
+    return answer.is_hidden();
 }
 
-void Accel::occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const {
-    occluded.assign(rays.size(), 0);
-    if (!impl_) return;
-    constexpr std::size_t kStream = 64;
-    std::array<RTCRay, kStream> stream;
-    for (std::size_t begin = 0; begin < rays.size(); begin += kStream) {
-        const std::size_t count = std::min(kStream, rays.size() - begin);
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        for (std::size_t i = 0; i < count; ++i) stream[i] = to_embree(rays[begin + i]);
-        rtcOccluded1M(impl_->scene, &context, stream.data(), static_cast<unsigned>(count),
-                      sizeof(RTCRay));
-        for (std::size_t i = 0; i < count; ++i) {
-            occluded[begin + i] = stream[i].tfar < 0.0f ? 1 : 0;
-        }
-    }
+void Accel::occluded(std::span<BareRay> rays) const {
+    if (!impl_ || rays.empty()) return;
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1M(impl_->scene, &context, to_embree(rays.data()),
+                  static_cast<unsigned>(rays.size()), sizeof(BareRay));
 }
 
 namespace {

@@ -4,7 +4,7 @@
 // starts on its own surface by luck: the caller offsets with `min_distance`.
 #pragma once
 
-#include "geometry/mesh.h"
+#include "trace/ray_and_hit.h"
 
 #include <cstdint>
 #include <memory>
@@ -30,6 +30,18 @@ struct Hit {
     bool is_hit() const { return part >= 0; }
 };
 
+/// What a ray of a list met, as a ray alone gets it.
+inline Hit hit_of(const RayAndHit& answered) {
+    Hit hit;
+    if (!answered.is_hit()) return hit;
+    hit.distance = answered.distance();
+    hit.part = answered.part;
+    hit.triangle = answered.triangle;
+    hit.barycentric = answered.barycentric;
+    hit.normal = answered.normal.normalized();
+    return hit;
+}
+
 struct AccelPart {
     std::shared_ptr<const Mesh> mesh;
     std::uint32_t mask = 0xffffffffu;
@@ -47,9 +59,12 @@ class Accel {
     /// Answers `hits[i]` for each ray. Neighbours of the list that run alike are traced together,
     /// in half the time or less; those that do not cost as much as alone.
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
+    /// Answers each ray in place.
+    /// @param are_alike neighbours are traced together; else one by one
+    void closest(std::span<RayAndHit> rays, bool are_alike) const;
     bool is_occluded(const Ray& ray) const;
-    /// Answers `occluded[i]` for each ray: in two thirds of the time or less, alike or not.
-    void occluded(std::span<const Ray> rays, std::vector<std::uint8_t>& occluded) const;
+    /// Answers each ray in place: in two thirds of the time or less, alike or not.
+    void occluded(std::span<BareRay> rays) const;
 
     /// The point of any surface nearest to `point` within `max_distance`: `distance` is Euclidean,
     /// `normal` geometric. Masks are ignored. Costs about 1 us.

@@ -32,21 +32,56 @@ TEST(Accel, MasksHideParts) {
     EXPECT_TRUE(accel.is_occluded({Vec3f(0, 0.01f, 5), Vec3f(0, 0, -1), 0, 4.9f, 1u}));
 }
 
-TEST(Accel, OcclusionAgreesWithClosestHit) {
-    const Accel accel = sphere_and_plane();
+/// Any way through the scene; half of them see the sphere alone.
+std::vector<Ray> random_rays() {
     Rng rng(3);
     std::vector<Ray> rays;
     for (int i = 0; i < 2000; ++i) {
         const auto u = [&] { return 4 * rng.next_float() - 2; };
-        rays.push_back({Vec3f(u(), u(), u() + 2.5f), Vec3f(u(), u(), u()), 1e-4f, 1.0f});
+        rays.push_back(
+            {Vec3f(u(), u(), u() + 2.5f), Vec3f(u(), u(), u()), 1e-4f, 1.0f, i % 2 == 0 ? 3u : 1u});
     }
-    std::vector<std::uint8_t> batch;
-    accel.occluded(rays, batch);
+    return rays;
+}
+
+TEST(Accel, OcclusionAgreesWithClosestHit) {
+    const Accel accel = sphere_and_plane();
+    const std::vector<Ray> rays = random_rays();
+    std::vector<BareRay> list;
+    for (const Ray& ray : rays) {
+        list.emplace_back(ray.origin, ray.direction, ray.max_distance, ray.mask);
+        list.back().min_distance = ray.min_distance;
+    }
+    accel.occluded(list);
     for (std::size_t i = 0; i < rays.size(); ++i) {
         const bool hit = accel.closest(rays[i]).is_hit();
         EXPECT_EQ(accel.is_occluded(rays[i]), hit);
-        EXPECT_EQ(batch[i] != 0, hit);
+        EXPECT_EQ(list[i].is_hidden(), hit);
     }
+}
+
+TEST(Accel, ListsAreAnsweredAsSingleRays) {
+    const Accel accel = sphere_and_plane();
+    const std::vector<Ray> rays = random_rays();
+    int hits = 0;
+    for (const bool are_alike : {false, true}) {
+        std::vector<RayAndHit> list;
+        for (const Ray& ray : rays) list.emplace_back(ray.origin, ray.direction, ray.mask);
+        accel.closest(list, are_alike);
+        for (std::size_t i = 0; i < rays.size(); ++i) {
+            const Hit alone =
+                accel.closest({rays[i].origin, rays[i].direction, 0.0f, 1e30f, rays[i].mask});
+            const Hit hit = hit_of(list[i]);
+            ASSERT_EQ(hit.part, alone.part);
+            if (!alone.is_hit()) continue;
+            ++hits;
+            EXPECT_EQ(hit.triangle, alone.triangle);
+            EXPECT_NEAR(hit.distance, alone.distance, 1e-5f);
+            EXPECT_NEAR((hit.normal - alone.normal).norm(), 0, 1e-6f);
+            EXPECT_NEAR((hit.barycentric - alone.barycentric).norm(), 0, 1e-4f);
+        }
+    }
+    EXPECT_GT(hits, 200);
 }
 
 TEST(Accel, NearestPointOnSphereAndPlane) {
