@@ -21,14 +21,12 @@ LitRelief::LitRelief(const Relief& relief, ReliefSamples samples, ReliefObservat
         return;
     }
     bounce_.emplace(relief);
-    const auto look = [&](const SurfacePoints& points, SkyShares& sky) {
-        BallBounce::View view = bounce_->view_from(points);
-        sky = std::move(view.sky);
-        return view.patches;
-    };
-    sample_view_ = look(sample_points_, sample_sky_).sparseView();
-    observation_view_ = look(observation_points_, observation_sky_).sparseView();
-    look(bounce_->patches(), patch_sky_);
+    BallBounce::View samples_view = bounce_->view_from(sample_points_);
+    BallBounce::View observations_view = bounce_->view_from(observation_points_);
+    sample_view_ = std::move(samples_view.patches);
+    sample_sky_ = std::move(samples_view.sky);
+    observation_view_ = std::move(observations_view.patches);
+    observation_sky_ = std::move(observations_view.sky);
 }
 
 void LitRelief::fill(Eigen::MatrixXf& field, const SurfacePoints& points,
@@ -58,7 +56,7 @@ LightFields LitRelief::fields(const std::vector<Vec3>& directions, bool with_sky
     fill(result.source, sample_points_, directions, with_sky ? &sample_sky_ : nullptr);
     fill(result.local, observation_points_, directions, with_sky ? &observation_sky_ : nullptr);
     if (bounce_)
-        fill(result.patch, bounce_->patches(), directions, with_sky ? &patch_sky_ : nullptr);
+        fill(result.patch, bounce_->patches(), directions, with_sky ? &bounce_->patch_sky() : nullptr);
     for (Index i = 0; i < result.source.rows(); ++i)
         result.source.row(i) *= samples_.area_px2[static_cast<std::size_t>(i)];
     return result;

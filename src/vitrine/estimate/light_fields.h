@@ -5,8 +5,6 @@
 #include "estimate/distance_histogram.h"
 #include "render/ball_bounce.h"
 
-#include <Eigen/SparseCore>
-
 #include <optional>
 
 namespace vitrine {
@@ -47,7 +45,6 @@ class LitRelief {
     SurfacePoints sample_points_, observation_points_;
     SkyShares sample_sky_, observation_sky_;
     std::optional<BallBounce> bounce_;  // of a cluster
-    SkyShares patch_sky_;
     /// What samples and observations see of its patches: few each.
     Eigen::SparseMatrix<float, Eigen::RowMajor> sample_view_, observation_view_;
     double eta_;

@@ -44,35 +44,14 @@ BallBounce::BallBounce(const Relief& cluster)
         }
         spread_.col(j) /= spread_.col(j).sum();
     }
-    between_ = view_from(patches()).patches;
+    View view = view_from(patches());
+    between_ = std::move(view.patches);
+    sky_ = std::move(view.sky);
 }
 
 const Ball& BallBounce::ball_at(std::size_t k) const {
     const std::size_t seen = cluster_.balls.size();
     return k < seen ? cluster_.balls[k] : cluster_.unseen_balls[k - seen];
-}
-
-std::size_t BallBounce::first_hit(const Vec3f& point, const Vec3f& direction, std::int16_t own,
-                                  float& distance) const {
-    const std::size_t count = cluster_.balls.size() + cluster_.unseen_balls.size();
-    std::size_t hit = count;
-    distance = 1e30f;
-    for (std::size_t k = 0; k < count; ++k) {
-        if (static_cast<std::int16_t>(k) == own) continue;
-        const Ball& ball = ball_at(k);
-        const Vec3f to_centre = ball.centre_px - point;
-        const float along = to_centre.dot(direction);
-        // A ball behind the point is not met, so an unseen ball does not hide its own patches.
-        if (along <= 0) continue;
-        const float rest =
-            ball.radius_px * ball.radius_px - to_centre.squaredNorm() + along * along;
-        if (rest <= 0) continue;
-        const float ahead = std::max(0.0f, along - std::sqrt(rest));
-        if (ahead >= distance) continue;
-        distance = ahead;
-        hit = k;
-    }
-    return hit;
 }
 
 std::size_t BallBounce::patch_at(std::size_t ball, const Vec3f& point) const {
@@ -87,24 +66,39 @@ template <typename OnPatch, typename OnSky>
 void BallBounce::look_around(const SurfacePoints& points, std::size_t i, const OnPatch& on_patch,
                              const OnSky& on_sky) const {
     const Vec3f p = points.position[i], n = points.normal[i];
-    const std::size_t none = cluster_.balls.size() + cluster_.unseen_balls.size();
+    std::vector<BallAhead> ahead;  // those that rise over the tangent plane
+    const std::size_t count = cluster_.balls.size() + cluster_.unseen_balls.size();
+    for (std::size_t k = 0; k < count; ++k) {
+        if (static_cast<std::int16_t>(k) == points.ball[i]) continue;
+        const BallAhead ball(k, ball_at(k), p);
+        if (ball.to_centre.dot(n) + ball_at(k).radius_px > 0) ahead.push_back(ball);
+    }
     for (const Vec3f& ray : ray_) {
         const float cosine = n.dot(ray);
         if (cosine <= 0) continue;
-        float distance = 0;
-        const std::size_t hit = first_hit(p, ray, points.ball[i], distance);
-        if (hit == none) {
+        const BallAhead* hit = nullptr;
+        float distance = 1e30f;
+        for (const BallAhead& ball : ahead) {
+            const float along = ball.to_centre.dot(ray);
+            if (!ball.is_met(along)) continue;
+            const float reach = ball.distance(along);
+            if (reach >= distance) continue;
+            distance = reach;
+            hit = &ball;
+        }
+        if (hit == nullptr) {
             on_sky(ray, cosine);
         } else {
-            on_patch(patch_at(hit, p + distance * ray), cosine);
+            on_patch(patch_at(hit->ball, p + distance * ray), cosine);
         }
     }
 }
 
 BallBounce::View BallBounce::view_from(const SurfacePoints& points) const {
     const std::size_t count = points.position.size();
-    View view{MatrixXf::Zero(static_cast<Index>(count), static_cast<Index>(position_.size())),
+    View view{{static_cast<Index>(count), static_cast<Index>(position_.size())},
               {std::vector<float>(count, 0.0f), std::vector<float>(count, 0.0f)}};
+    std::vector<std::vector<Eigen::Triplet<float>>> rows(count);
     parallel_for(count, 64, [&](std::size_t i) {
         float all = 0, all_below = 0;
         for (const Vec3f& ray : ray_) {
@@ -115,7 +109,7 @@ BallBounce::View BallBounce::view_from(const SurfacePoints& points) const {
         look_around(
             points, i,
             [&](std::size_t patch, float cosine) {
-                view.patches(static_cast<Index>(i), static_cast<Index>(patch)) += cosine / all;
+                rows[i].emplace_back(static_cast<int>(i), static_cast<int>(patch), cosine / all);
             },
             [&](const Vec3f& ray, float cosine) {
                 view.sky.ambient[i] += cosine / all;
@@ -124,6 +118,9 @@ BallBounce::View BallBounce::view_from(const SurfacePoints& points) const {
                 }
             });
     });
+    std::vector<Eigen::Triplet<float>> all_rows;
+    for (const auto& row : rows) all_rows.insert(all_rows.end(), row.begin(), row.end());
+    view.patches.setFromTriplets(all_rows.begin(), all_rows.end());
     return view;
 }
 
@@ -139,36 +136,29 @@ MatrixXf BallBounce::exitance(const MatrixXf& direct, double albedo) const {
     return result;
 }
 
-std::vector<Rgb> BallBounce::irradiance(const SurfacePoints& points,
-                                        const MatrixXf& exitance) const {
-    std::vector<Rgb> result(points.position.size(), Rgb::Zero());
-    parallel_for(points.position.size(), 64, [&](std::size_t i) {
-        float all = 0;
-        for (const Vec3f& ray : ray_) all += std::max(0.0f, points.normal[i].dot(ray));
-        look_around(
-            points, i,
-            [&](std::size_t patch, float cosine) {
-                result[i] +=
-                    cosine / all * exitance.row(static_cast<Index>(patch)).transpose().array();
-            },
-            [](const Vec3f&, float) {});
-    });
-    return result;
+SoftBallLight::SoftBallLight(const Relief& cluster, const ViewLights& lights, double eta)
+    : bounce_(cluster), lights_(lights) {
+    const SurfacePoints patches = bounce_.patches();
+    const std::vector<Rgb> lamps = lamp_light(Occluder(cluster), patches, lights, eta, true);
+    MatrixXf direct(static_cast<Index>(lamps.size()), 3);
+    for (std::size_t i = 0; i < lamps.size(); ++i) {
+        direct.row(static_cast<Index>(i)) =
+            (lamps[i] + sky_light(lights, bounce_.patch_sky(), i)).matrix().transpose();
+    }
+    exitance_.resize(direct.rows(), 3);
+    for (int c = 0; c < 3; ++c)
+        exitance_.col(c) = bounce_.exitance(direct.col(c), cluster.ball_albedo[c]);
 }
 
-std::vector<Rgb> with_bounces(const Relief& relief, const SurfacePoints& points,
-                              const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct) {
-    std::vector<Rgb> result = direct(points);
-    if (!relief.is_cluster() || relief.ball_albedo.maxCoeff() <= 0) return result;
-    const BallBounce bounce(relief);
-    const std::vector<Rgb> on_patches = direct(bounce.patches());
-    MatrixXf exitance(static_cast<Index>(on_patches.size()), 3);
-    for (Index i = 0; i < exitance.rows(); ++i)
-        exitance.row(i) = on_patches[static_cast<std::size_t>(i)].matrix().transpose();
-    for (int c = 0; c < 3; ++c)
-        exitance.col(c) = bounce.exitance(exitance.col(c), relief.ball_albedo[c]).col(0);
-    const std::vector<Rgb> added = bounce.irradiance(points, exitance);
-    for (std::size_t i = 0; i < result.size(); ++i) result[i] += added[i];
+std::vector<Rgb> SoftBallLight::at(const SurfacePoints& points) const {
+    const BallBounce::View view = bounce_.view_from(points);
+    const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> bounced =
+        view.patches * exitance_;
+    std::vector<Rgb> result;
+    for (std::size_t i = 0; i < points.position.size(); ++i) {
+        result.push_back(sky_light(lights_, view.sky, i) +
+                         bounced.row(static_cast<Index>(i)).transpose().array());
+    }
     return result;
 }
 

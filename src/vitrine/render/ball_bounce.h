@@ -3,9 +3,7 @@
 
 #include "render/relief_light.h"
 
-#include <Eigen/Core>
-
-#include <functional>
+#include <Eigen/SparseCore>
 
 namespace vitrine {
 
@@ -19,27 +17,24 @@ class BallBounce {
 
     /// Where the irradiance by the lights alone is asked for.
     SurfacePoints patches() const { return {position_, normal_, ball_}; }
+    /// What patches see of the sky.
+    const SkyShares& patch_sky() const { return sky_; }
 
     /// What leaves the patches, all bounces; patches x L.
     /// @param direct irradiance of the patches under each of L lights
     /// @param albedo of the balls, below 1
     Eigen::MatrixXf exitance(const Eigen::MatrixXf& direct, double albedo) const;
 
-    /// What points see: of each patch, irradiance per exitance (points x patches), and the sky.
+    /// What points see: of each patch, irradiance per exitance (points x patches, few each), and
+    /// the sky.
     struct View {
-        Eigen::MatrixXf patches;
+        Eigen::SparseMatrix<float, Eigen::RowMajor> patches;
         SkyShares sky;
     };
     View view_from(const SurfacePoints& points) const;
 
-    /// Irradiance at points by what leaves the patches, patches x 3.
-    std::vector<Rgb> irradiance(const SurfacePoints& points, const Eigen::MatrixXf& exitance) const;
-
   private:
     const Ball& ball_at(std::size_t k) const;
-    /// The ball that a ray meets first; the number of balls if none.
-    std::size_t first_hit(const Vec3f& point, const Vec3f& direction, std::int16_t own,
-                          float& distance) const;
     std::size_t patch_at(std::size_t ball, const Vec3f& point) const;
     template <typename OnPatch, typename OnSky>
     void look_around(const SurfacePoints& points, std::size_t i, const OnPatch& on_patch,
@@ -49,13 +44,23 @@ class BallBounce {
     std::vector<Vec3f> position_, normal_;
     std::vector<std::int16_t> ball_;  ///< -1: unseen
     std::vector<Vec3f> patch_direction_, ray_;
-    Eigen::MatrixXf spread_;   ///< of one ball, patches x patches: share of what enters that leaves
-    Eigen::MatrixXf between_;  ///< patches x patches: irradiance per exitance
+    Eigen::MatrixXf spread_;  ///< of one ball, patches x patches: share of what enters that leaves
+    Eigen::SparseMatrix<float, Eigen::RowMajor> between_;  ///< patches x patches, as in View
+    SkyShares sky_;
 };
 
-/// Irradiance at the points by lights and, where Relief::ball_albedo says so, by other balls.
-/// @param direct the lights' alone, at any points
-std::vector<Rgb> with_bounces(const Relief& relief, const SurfacePoints& points,
-                              const std::function<std::vector<Rgb>(const SurfacePoints&)>& direct);
+/// What reaches the balls of a cluster from all sides and changes slowly over them: from
+/// everywhere, from below and, where Relief::ball_albedo says so, from other balls.
+class SoftBallLight {
+  public:
+    SoftBallLight(const Relief& cluster, const ViewLights& lights, double eta);
+    /// Irradiance. O(points rays balls).
+    std::vector<Rgb> at(const SurfacePoints& points) const;
+
+  private:
+    BallBounce bounce_;
+    const ViewLights& lights_;
+    Eigen::MatrixXf exitance_;  ///< patches x 3
+};
 
 }  // namespace vitrine

@@ -8,19 +8,16 @@
 namespace vitrine {
 namespace {
 
-bool is_in_the_way(const Ball& ball, const Vec3f& point, const Vec3f& direction) {
-    const Vec3f to_centre = ball.centre_px - point;
-    const float along = to_centre.dot(direction);
-    return along > 0 &&
-           (to_centre - along * direction).squaredNorm() < ball.radius_px * ball.radius_px;
-}
-
 bool is_hidden_by_balls(const Relief& relief, std::size_t own, const Vec3f& point,
                         const Vec3f& direction) {
+    const auto is_in_the_way = [&](std::size_t k, const Ball& ball) {
+        const BallAhead ahead(k, ball, point);
+        return ahead.is_met(ahead.to_centre.dot(direction));
+    };
     for (std::size_t k = 0; k < relief.balls.size(); ++k)
-        if (k != own && is_in_the_way(relief.balls[k], point, direction)) return true;
+        if (k != own && is_in_the_way(k, relief.balls[k])) return true;
     return std::any_of(relief.unseen_balls.begin(), relief.unseen_balls.end(),
-                       [&](const Ball& ball) { return is_in_the_way(ball, point, direction); });
+                       [&](const Ball& ball) { return is_in_the_way(0, ball); });
 }
 
 bool is_hidden_by_relief(const Relief& relief, float top, const Vec3f& point, const Vec3f& normal,
@@ -108,27 +105,15 @@ SkyShares sky_shares(const Occluder& occluder, const SurfacePoints& points, int 
     return shares;
 }
 
-namespace {
-
-std::vector<Rgb> direct_light(const Occluder& occluder, const SurfacePoints& points,
-                              const ViewLights& lights, double eta, bool use_shadows) {
+std::vector<Rgb> lamp_light(const Occluder& occluder, const SurfacePoints& points,
+                            const ViewLights& lights, double eta, bool use_shadows) {
     const std::size_t count = points.position.size();
-    std::vector<Rgb> result(count);
-    SkyShares sky;
-    if (use_shadows) {
-        sky = sky_shares(occluder, points);
-    } else {
-        sky.ambient.assign(count, 1.0f);
-        for (const Vec3f& normal : points.normal) sky.below.push_back(facing_down(normal));
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-        result[i] = lights.ambient.cast<float>() * sky.ambient[i] +
-                    lights.from_below.cast<float>() * sky.below[i];
-    }
+    std::vector<Rgb> result(count, Rgb::Zero());
     for (const ViewLight& light : lights.lights) {
         std::vector<float> seen(count, 1.0f);
         if (use_shadows) seen = occluder.visibility(points, light.direction);
         for (std::size_t i = 0; i < count; ++i) {
+            if (seen[i] == 0) continue;
             const double e = entering_irradiance(points.normal[i], light.direction, eta) * seen[i];
             result[i] += (light.intensity * e).cast<float>();
         }
@@ -136,15 +121,26 @@ std::vector<Rgb> direct_light(const Occluder& occluder, const SurfacePoints& poi
     return result;
 }
 
-}  // namespace
-
 std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& points,
                                 const ViewLights& lights, double eta, bool use_shadows) {
     const Occluder occluder(relief);
-    const auto direct = [&](const SurfacePoints& lit) {
-        return direct_light(occluder, lit, lights, eta, use_shadows);
-    };
-    return use_shadows ? with_bounces(relief, points, direct) : direct(points);
+    const std::size_t count = points.position.size();
+    std::vector<Rgb> result = lamp_light(occluder, points, lights, eta, use_shadows);
+    if (use_shadows && relief.is_cluster()) {
+        const std::vector<Rgb> soft = SoftBallLight(relief, lights, eta).at(points);
+        for (std::size_t i = 0; i < count; ++i) result[i] += soft[i];
+        return result;
+    }
+    SkyShares sky;
+    if (use_shadows) {
+        sky = sky_shares(occluder, points);
+    } else {
+        sky.ambient.assign(count, 1.0f);
+        for (const Vec3f& normal : points.normal) sky.below.push_back(facing_down(normal));
+    }
+    for (std::size_t i = 0; i < count; ++i)
+        result[i] += sky_light(lights, sky, i);
+    return result;
 }
 
 }  // namespace vitrine

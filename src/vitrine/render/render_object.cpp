@@ -2,14 +2,16 @@
 
 #include "base/parallel.h"
 #include "image/poisson.h"
+#include "render/ball_bounce.h"
 
 namespace vitrine {
 namespace {
 
 /// Values on the cells of the lattice of `samples` (from `begin` on), read between their centres.
+template <typename T>
 class LatticeField {
   public:
-    LatticeField(const ReliefSamples& samples, const std::vector<float>& values, std::size_t begin)
+    LatticeField(const ReliefSamples& samples, const std::vector<T>& values, std::size_t begin)
         : samples_(samples), lattice_(samples.cell.width(), samples.cell.height()) {
         Mask known(lattice_.width(), lattice_.height());
         for (std::size_t k = 0; k < lattice_.size(); ++k) {
@@ -19,7 +21,7 @@ class LatticeField {
         }
         lattice_ = extend_nearest(lattice_, known);
     }
-    float operator()(int x, int y) const {
+    T operator()(int x, int y) const {
         const double u = (x + 0.5 - samples_.origin_x) / samples_.step_px - 0.5;
         const double v = (y + 0.5 - samples_.origin_y) / samples_.step_px - 0.5;
         const int x0 = static_cast<int>(std::floor(u)), y0 = static_cast<int>(std::floor(v));
@@ -30,7 +32,7 @@ class LatticeField {
 
   private:
     const ReliefSamples& samples_;
-    ImageF lattice_;
+    Image<T> lattice_;
 };
 
 /// A ball alone, in a picture of its own; (x, y) there is (x + left, y + top) in the photo.
@@ -64,29 +66,41 @@ LocalBall local_ball(const Ball& ball) {
     return local;
 }
 
-/// Light on both sides of one ball among the others.
+/// Cells of each side of a ball on which soft light is computed.
+constexpr int kSoftCells = 300;
+
+/// Light on both sides of one ball among the others: lamps at every pixel, as their shadows have
+/// edges; the rest on a lattice.
 ReliefIrradiance ball_irradiance(const Relief& cluster, std::size_t k, const LocalBall& local,
-                                 const ViewLights& lights, double eta) {
+                                 const ViewLights& lights, const Occluder& occluder,
+                                 const SoftBallLight& soft_light, double eta) {
     const Ball& ball = cluster.balls[k];
-    std::vector<Vec3f> position, normal;
-    std::vector<std::size_t> pixel;
-    for (std::size_t i = 0; i < local.relief.mask.size(); ++i)
-        if (local.relief.mask[i] > 127) pixel.push_back(i);
-    for (const float side : {1.0f, -1.0f}) {
-        for (const std::size_t i : pixel) {
+    const Mask& mask = local.relief.mask;
+    const ReliefSamples samples = sample_relief(local.relief, kSoftCells);
+    std::vector<Vec3f> centres;
+    for (const Vec3f& n : samples.normal) centres.push_back(ball.centre_px + ball.radius_px * n);
+    const std::vector<std::int16_t> cell_ball(centres.size(), static_cast<std::int16_t>(k));
+    const std::vector<Rgb> soft = soft_light.at({centres, samples.normal, cell_ball});
+
+    ReliefIrradiance result{ImageRgb(mask.width(), mask.height()),
+                            ImageRgb(mask.width(), mask.height())};
+    for (const bool is_front : {true, false}) {
+        std::vector<Vec3f> position, normal;
+        for (std::size_t i = 0; i < mask.size(); ++i) {
+            if (mask[i] <= 127) continue;
             const Vec3f n = local.relief.normals[i];
-            normal.emplace_back(n.x(), n.y(), side * n.z());
+            normal.emplace_back(n.x(), n.y(), is_front ? n.z() : -n.z());
             position.push_back(ball.centre_px + ball.radius_px * normal.back());
         }
-    }
-    const std::vector<std::int16_t> own(position.size(), static_cast<std::int16_t>(k));
-    const std::vector<Rgb> light =
-        entering_light(cluster, {position, normal, own}, lights, eta, true);
-    ReliefIrradiance result{ImageRgb(local.relief.mask.width(), local.relief.mask.height()),
-                            ImageRgb(local.relief.mask.width(), local.relief.mask.height())};
-    for (std::size_t j = 0; j < pixel.size(); ++j) {
-        result.front[pixel[j]] = light[j];
-        result.back[pixel[j]] = light[pixel.size() + j];
+        const std::vector<std::int16_t> own(position.size(), static_cast<std::int16_t>(k));
+        const std::vector<Rgb> lamps =
+            lamp_light(occluder, {position, normal, own}, lights, eta, true);
+        const LatticeField<Rgb> field(samples, soft, is_front ? 0 : samples.front_count);
+        ImageRgb& side = is_front ? result.front : result.back;
+        std::size_t next = 0;
+        for (int y = 0; y < mask.height(); ++y)
+            for (int x = 0; x < mask.width(); ++x)
+                if (is_inside(mask, x, y)) side(x, y) = lamps[next++] + field(x, y);
     }
     return result;
 }
@@ -95,9 +109,12 @@ ImageRgb render_cluster(const Relief& relief, const ViewLights& lights,
                         const RadialProfile& profile, const TranslucentRenderOptions& options) {
     ImageRgb result(relief.mask.width(), relief.mask.height());
     Mask known(result.width(), result.height());
+    const Occluder occluder(relief);
+    const SoftBallLight soft(relief, lights, options.eta);
     for (std::size_t k = 0; k < relief.balls.size(); ++k) {
         const LocalBall local = local_ball(relief.balls[k]);
-        const ReliefIrradiance irradiance = ball_irradiance(relief, k, local, lights, options.eta);
+        const ReliefIrradiance irradiance = 
+            ball_irradiance(relief, k, local, lights, occluder, soft, options.eta);
         const ImageRgb picture =
             TranslucentRelief(local.relief, options).render(irradiance, profile);
         for (int y = 0; y < picture.height(); ++y) {
@@ -130,8 +147,9 @@ ReliefIrradiance irradiance_with_shadows(const Relief& relief, const ViewLights&
     for (const bool is_front : {true, false}) {
         ImageRgb& side = is_front ? result.front : result.back;
         const std::size_t begin = is_front ? 0 : samples.front_count;
-        const LatticeField ambient(samples, sky.ambient, begin), below(samples, sky.below, begin);
-        std::vector<LatticeField> seen;
+        const LatticeField<float> ambient(samples, sky.ambient, begin);
+        const LatticeField<float> below(samples, sky.below, begin);
+        std::vector<LatticeField<float>> seen;
         for (const ViewLight& light : lights.lights)
             seen.emplace_back(samples, occluder.visibility(points, light.direction), begin);
         parallel_for(static_cast<std::size_t>(side.height()), 8, [&](std::size_t row) {
