@@ -79,6 +79,9 @@ PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptio
             dome.alpha = 0;
             const Relief inflated = shade_to_shape(analysis.highlights.diffuse, photo.mask, dome);
             for (int round = 0; round < options.refinement_rounds; ++round) {
+                light_options.known_lamps.clear();
+                for (const ViewLight& light : analysis.explaining.lights.lights)
+                    light_options.known_lamps.push_back(light.direction);
                 analysis.relief = refine_relief(
                     inflated, analysis.highlights.diffuse, analysis.highlights.grown,
                     analysis.explaining.lights, analysis.explaining.kernel_px, light_options.eta);

@@ -52,6 +52,7 @@ class Heights {
         y_ = exitance_rows(gaussian_blur(diffuse, 1.0), observations_, options.eta);
         for (const ViewLight& light : lights.lights.lights) directions_.push_back(light.direction);
         const LitRelief object(work_, samples_, observations_, options.eta, true);
+        const LightPaths paths(object);  // within each ball: they move along
         for (int c = 0; c < 3; ++c) {
             const double mean = y_.col(c).mean();
             const bool is_dark =
@@ -59,7 +60,7 @@ class Heights {
             if (is_dark) continue;
             channels_.push_back(c);
             y_.col(c) /= mean;
-            operators_.emplace_back(object, lights.kernel[static_cast<std::size_t>(c)],
+            operators_.emplace_back(paths, lights.kernel[static_cast<std::size_t>(c)],
                                     curved_body_factor(kTypicalAlbedo));
         }
         if (channels_.empty()) return;

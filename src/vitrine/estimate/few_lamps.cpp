@@ -33,9 +33,11 @@ using LengthImages = std::vector<MatrixXd>;
 
 class Fit {
   public:
-    Fit(const LitRelief& object, const MatrixXd& exitance, const Rgbd& ground_colour,
-        const std::vector<LampVote>& votes, const FewLampsOptions& options)
+    Fit(const LitRelief& object, const LightPaths& paths, const MatrixXd& exitance,
+        const Rgbd& ground_colour, const std::vector<LampVote>& votes,
+        const FewLampsOptions& options)
         : object_(object),
+          paths_(paths),
           ground_colour_(ground_colour),
           votes_(votes),
           options_(options),
@@ -57,27 +59,13 @@ class Fit {
     FewLamps fit_kernels(const std::vector<Vec3>& directions,
                          const std::vector<SeenAt>& seen_at) const {
         const LightFields fields = object_.fields(directions, true);
-        // All channels at once: they differ in how the closed body weighs the same distances.
-        const Index count = fields.source.cols();
-        LightFields lit;
-        lit.source.resize(fields.source.rows(), kChannels * count);
-        lit.local.resize(fields.local.rows(), kChannels * count);
-        for (std::size_t c = 0; c < kChannels; ++c) {
-            const LightFields own =
-                object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]);
-            lit.source.middleCols(static_cast<Index>(c) * count, count) = own.source;
-            lit.local.middleCols(static_cast<Index>(c) * count, count) = own.local;
-        }
-        const DistanceHistogram histogram(object_.observations(), object_.samples(), lit.source,
-                                          lit.local,
-                                          repeated_bodies(static_cast<std::size_t>(count)));
+        std::vector<RadialKernel> exponentials;
+        for (const double length : lengths_) exponentials.push_back(plain_exponential(length));
         std::array<LengthImages, kChannels> images;
-        for (const double length : lengths_) {
-            const MatrixXd all = histogram.image_of(plain_exponential(length));
-            for (int c = 0; c < kChannels; ++c) {
-                images[c].push_back(all.middleCols(c * count, count));
-                images[c].back().rightCols<1>() *= ground_colour_[c];
-            }
+        for (std::size_t c = 0; c < kChannels; ++c) {
+            images[c] = paths_.images(exponentials, bounced(fields, c), body_[c]);
+            for (MatrixXd& image : images[c])
+                image.rightCols<1>() *= ground_colour_[static_cast<int>(c)];
         }
         FewLamps best;
         for (const double length : lengths_) {
@@ -137,11 +125,8 @@ class Fit {
             trial.directions[l] = direction;
             const LightFields fields = object_.fields({direction}, false);
             std::array<MatrixXd, kChannels> moved = images;
-            for (int c = 0; c < kChannels; ++c)
-                moved[c].col(static_cast<Index>(l)) =
-                    operators[c](
-                        object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]))
-                        .col(0);
+            for (std::size_t c = 0; c < kChannels; ++c)
+                moved[c].col(static_cast<Index>(l)) = operators[c](bounced(fields, c)).col(0);
             solve_intensities(moved, trial);
             if (cost(trial) >= cost(lamps) - 5e-4 * options_.looks) return false;
             lamps = std::move(trial);
@@ -217,11 +202,8 @@ class Fit {
     }
 
   private:
-    /// Of each channel, for `count` fields.
-    std::vector<CurvedBodyFactor> repeated_bodies(std::size_t count) const {
-        std::vector<CurvedBodyFactor> result;
-        for (const CurvedBodyFactor& body : body_) result.insert(result.end(), count, body);
-        return result;
+    LightFields bounced(const LightFields& fields, std::size_t channel) const {
+        return object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(channel)]);
     }
 
     std::array<MatrixXd, kChannels> images_of(const std::array<LengthImages, kChannels>& images,
@@ -242,7 +224,7 @@ class Fit {
     std::vector<KernelImage> operators_of(const FewLamps& lamps) const {
         std::vector<KernelImage> operators;
         for (std::size_t c = 0; c < kChannels; ++c)
-            operators.emplace_back(object_, lamps.kernel[c], body_[c]);
+            operators.emplace_back(paths_, lamps.kernel[c], body_[c]);
         return operators;
     }
 
@@ -251,8 +233,7 @@ class Fit {
         const LightFields fields = object_.fields(lamps.directions, true);
         std::array<MatrixXd, kChannels> images;
         for (std::size_t c = 0; c < kChannels; ++c) {
-            images[c] =
-                operators[c](object_.bounced(fields, bounce_share_ * albedo_[static_cast<int>(c)]));
+            images[c] = operators[c](bounced(fields, c));
             images[c].rightCols<1>() *= ground_colour_[static_cast<int>(c)];
         }
         return images;
@@ -302,6 +283,7 @@ class Fit {
     }
 
     const LitRelief& object_;
+    const LightPaths& paths_;
     Rgbd ground_colour_;
     const std::vector<LampVote>& votes_;
     const FewLampsOptions& options_;
@@ -393,8 +375,10 @@ FewLamps fit_few_lamps(const LitRelief& object, const MatrixXd& exitance, const 
                        const std::vector<LampStart>& starts, const std::vector<LampVote>& votes,
                        const FewLampsOptions& options) {
     VITRINE_CHECK(!starts.empty());
+    const LightPaths paths(object);
     std::vector<Candidate> candidates(
-        starts.size(), {Fit(object, exitance, ground_colour, votes, options), FewLamps(), 0});
+        starts.size(),
+        {Fit(object, paths, exitance, ground_colour, votes, options), FewLamps(), 0});
     parallel_for(starts.size(), 1, [&](std::size_t k) {
         auto& [fit, lamps, cost] = candidates[k];
         lamps = fit.fit_kernels(starts[k].directions, starts[k].seen_at);

@@ -2,6 +2,9 @@
 
 #include "base/parallel.h"
 
+#include <algorithm>
+#include <tuple>
+
 namespace vitrine {
 
 using Eigen::Index;
@@ -56,7 +59,8 @@ LightFields LitRelief::fields(const std::vector<Vec3>& directions, bool with_sky
     fill(result.source, sample_points_, directions, with_sky ? &sample_sky_ : nullptr);
     fill(result.local, observation_points_, directions, with_sky ? &observation_sky_ : nullptr);
     if (bounce_)
-        fill(result.patch, bounce_->patches(), directions, with_sky ? &bounce_->patch_sky() : nullptr);
+        fill(result.patch, bounce_->patches(), directions,
+             with_sky ? &bounce_->patch_sky() : nullptr);
     for (Index i = 0; i < result.source.rows(); ++i)
         result.source.row(i) *= samples_.area_px2[static_cast<std::size_t>(i)];
     return result;
@@ -74,29 +78,125 @@ LightFields LitRelief::bounced(const LightFields& direct, double albedo) const {
     return result;
 }
 
-KernelImage::KernelImage(const LitRelief& object, const RadialKernel& kernel,
-                         const CurvedBodyFactor& body)
-    : far_(static_cast<Index>(object.observations().position.size()),
-           static_cast<Index>(object.samples().position.size())) {
+LightPaths::LightPaths(const LitRelief& object) : step_px_(object.samples().step_px) {
     const ReliefSamples& samples = object.samples();
     const ReliefObservations& observations = object.observations();
-    const CappedKernel capped(kernel, 1.5 * samples.step_px);
-    near_ = capped.near_share();
-    parallel_for(observations.position.size(), 8, [&](std::size_t p) {
-        for (std::size_t i = 0; i < samples.position.size(); ++i) {
-            float& entry = far_(static_cast<Index>(p), static_cast<Index>(i));
-            entry = 0;
-            if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
-            const float rise = chord_rise(samples.position[i], samples.normal[i],
-                                          observations.position[p], observations.normal[p]);
-            entry = static_cast<float>(
-                capped((samples.position[i] - observations.position[p]).norm()) * body(rise));
+    std::size_t path_count = 0;
+    for (std::size_t p = 0; p < observations.position.size(); ++p) {
+        auto begin = samples.ball.begin(), end = samples.ball.end();
+        if (!samples.ball.empty())  // samples come ball by ball
+            std::tie(begin, end) = std::equal_range(begin, end, observations.ball[p]);
+        const Index first = begin - samples.ball.begin();
+        const Index count = samples.ball.empty() ? static_cast<Index>(samples.position.size())
+                                                 : static_cast<Index>(end - begin);
+        bundles_.push_back({first, count, path_count});
+        path_count += static_cast<std::size_t>(count);
+    }
+    distance_.resize(path_count);
+    rise_.resize(path_count);
+    parallel_for(bundles_.size(), 8, [&](std::size_t p) {
+        const Bundle& bundle = bundles_[p];
+        for (Index k = 0; k < bundle.sample_count; ++k) {
+            const auto i = static_cast<std::size_t>(bundle.first_sample + k);
+            const std::size_t path = bundle.begin + static_cast<std::size_t>(k);
+            distance_[path] = (samples.position[i] - observations.position[p]).norm();
+            rise_[path] = chord_rise(samples.position[i], samples.normal[i],
+                                     observations.position[p], observations.normal[p]);
         }
+    });
+    for (const float r : distance_) reach_px_ = std::max(reach_px_, r);
+}
+
+namespace {
+
+/// Kernels on a grid of distances finer than any is curved, read between its nodes.
+class KernelTables {
+  public:
+    KernelTables(const std::vector<CappedKernel>& kernels, double step_px, float reach_px)
+        : count_(kernels.size()), per_px_(static_cast<float>(50 / step_px)) {
+        const auto node_count = static_cast<std::size_t>(reach_px * per_px_) + 2;
+        values_.reserve(node_count * count_);
+        for (std::size_t node = 0; node < node_count; ++node)
+            for (const CappedKernel& kernel : kernels)
+                values_.push_back(value(kernel, static_cast<double>(node) / per_px_));
+    }
+    /// Writes factor * R_k(r) for each kernel k.
+    void read(float r, float factor, float* out) const {
+        const float u = r * per_px_;
+        const auto node = static_cast<std::size_t>(u);
+        const float t = u - static_cast<float>(node);
+        const float *low = &values_[node * count_], *high = low + count_;
+        for (std::size_t k = 0; k < count_; ++k)
+            out[k] = factor * (low[k] + t * (high[k] - low[k]));
+    }
+
+  private:
+    /// What is too little to matter is 0: sums of denormal numbers take ten times as long.
+    static float value(const CappedKernel& kernel, double r) {
+        constexpr double kLeast = 1e-15;
+        const double rd = kernel(r);
+        return rd < kLeast * kernel(0) ? 0 : static_cast<float>(rd);
+    }
+
+    std::size_t count_;
+    float per_px_;
+    std::vector<float> values_;  ///< [node][kernel]
+};
+
+float gain(const CurvedBodyFactor& body, float rise) {
+    return 1 + rise * (static_cast<float>(body.linear) + rise * static_cast<float>(body.quadratic));
+}
+
+}  // namespace
+
+std::vector<Eigen::MatrixXd> LightPaths::images(const std::vector<RadialKernel>& kernels,
+                                                const LightFields& fields,
+                                                const CurvedBodyFactor& body) const {
+    std::vector<CappedKernel> capped;
+    std::vector<Eigen::MatrixXd> result;
+    for (const RadialKernel& kernel : kernels) {
+        capped.emplace_back(kernel, 1.5 * step_px_);
+        result.emplace_back(capped.back().near_share() * fields.local.cast<double>());
+    }
+    const KernelTables tables(capped, step_px_, reach_px_);
+    parallel_for(bundles_.size(), 8, [&](std::size_t p) {
+        const Bundle& bundle = bundles_[p];
+        Eigen::MatrixXf far(static_cast<Index>(kernels.size()), bundle.sample_count);
+        for (Index k = 0; k < bundle.sample_count; ++k) {
+            const std::size_t path = bundle.begin + static_cast<std::size_t>(k);
+            tables.read(distance_[path], gain(body, rise_[path]), far.col(k).data());
+        }
+        const Eigen::MatrixXf light =
+            far * fields.source.middleRows(bundle.first_sample, bundle.sample_count);
+        for (std::size_t k = 0; k < kernels.size(); ++k) {
+            result[k].row(static_cast<Index>(p)) += light.row(static_cast<Index>(k)).cast<double>();
+        }
+    });
+    return result;
+}
+
+KernelImage::KernelImage(const LightPaths& paths, const RadialKernel& kernel,
+                         const CurvedBodyFactor& body)
+    : bundles_(paths.bundles_), far_(paths.distance_.size()) {
+    const CappedKernel capped(kernel, 1.5 * paths.step_px_);
+    near_ = capped.near_share();
+    const KernelTables table({capped}, paths.step_px_, paths.reach_px_);
+    parallel_for(far_.size(), 4096, [&](std::size_t path) {
+        table.read(paths.distance_[path], gain(body, paths.rise_[path]), &far_[path]);
     });
 }
 
 Eigen::MatrixXd KernelImage::operator()(const LightFields& fields) const {
-    return (far_ * fields.source).cast<double>() + near_ * fields.local.cast<double>();
+    Eigen::MatrixXd result = near_ * fields.local.cast<double>();
+    parallel_for(bundles_.size(), 32, [&](std::size_t p) {
+        const LightPaths::Bundle& bundle = bundles_[p];
+        const Eigen::Map<const Eigen::VectorXf> far(&far_[bundle.begin], bundle.sample_count);
+        for (Index l = 0; l < result.cols(); ++l) {
+            result(static_cast<Index>(p), l) +=
+                far.dot(fields.source.col(l).segment(bundle.first_sample, bundle.sample_count));
+        }
+    });
+    return result;
 }
 
 }  // namespace vitrine

@@ -138,8 +138,7 @@ std::vector<Rgb> entering_light(const Relief& relief, const SurfacePoints& point
         sky.ambient.assign(count, 1.0f);
         for (const Vec3f& normal : points.normal) sky.below.push_back(facing_down(normal));
     }
-    for (std::size_t i = 0; i < count; ++i)
-        result[i] += sky_light(lights, sky, i);
+    for (std::size_t i = 0; i < count; ++i) result[i] += sky_light(lights, sky, i);
     return result;
 }
 

@@ -113,7 +113,7 @@ ImageRgb render_cluster(const Relief& relief, const ViewLights& lights,
     const SoftBallLight soft(relief, lights, options.eta);
     for (std::size_t k = 0; k < relief.balls.size(); ++k) {
         const LocalBall local = local_ball(relief.balls[k]);
-        const ReliefIrradiance irradiance = 
+        const ReliefIrradiance irradiance =
             ball_irradiance(relief, k, local, lights, occluder, soft, options.eta);
         const ImageRgb picture =
             TranslucentRelief(local.relief, options).render(irradiance, profile);
