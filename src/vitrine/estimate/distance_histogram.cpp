@@ -4,6 +4,8 @@
 #include "base/rng.h"
 #include "image/filter.h"
 
+#include <algorithm>
+
 namespace vitrine {
 
 CappedKernel::CappedKernel(RadialKernel kernel, double rho)
@@ -56,6 +58,14 @@ ReliefObservations draw_observations(const Relief& relief, const Mask& excluded,
         if (relief.is_cluster()) observations.ball.push_back(relief.ball_of[i]);
     }
     return observations;
+}
+
+SampleRange samples_about(const ReliefSamples& samples, const ReliefObservations& observations,
+                          std::size_t p) {
+    if (samples.ball.empty()) return {0, samples.position.size()};
+    const auto start = samples.ball.begin();  // they come ball by ball
+    const auto [first, last] = std::equal_range(start, samples.ball.end(), observations.ball[p]);
+    return {static_cast<std::size_t>(first - start), static_cast<std::size_t>(last - start)};
 }
 
 Eigen::MatrixXf irradiance_rows(const std::vector<Rgb>& irradiance) {
@@ -121,8 +131,8 @@ DistanceHistogram::DistanceHistogram(const ReliefObservations& observations,
     parallel_for(observation_count_, 8, [&](std::size_t p) {
         float* block = &sums_[p * nodes_.size() * fields];
         Eigen::RowVectorXf row(field_count_);
-        for (std::size_t i = 0; i < samples.position.size(); ++i) {
-            if (!samples.ball.empty() && samples.ball[i] != observations.ball[p]) continue;
+        const SampleRange about = samples_about(samples, observations, p);
+        for (std::size_t i = about.first; i < about.last; ++i) {
             const double r = (samples.position[i] - observations.position[p]).norm();
             std::size_t k = node_below[std::min(static_cast<std::size_t>(r / lookup_step),
                                                 node_below.size() - 1)];

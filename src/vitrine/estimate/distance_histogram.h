@@ -45,6 +45,14 @@ struct ReliefObservations {
 ReliefObservations draw_observations(const Relief& relief, const Mask& excluded, std::size_t count,
                                      double rim_px, double min_cos, std::uint64_t seed);
 
+/// The samples [first, last) whose light reaches observation p: all; on a cluster those of its
+/// ball.
+struct SampleRange {
+    std::size_t first, last;
+};
+SampleRange samples_about(const ReliefSamples& samples, const ReliefObservations& observations,
+                          std::size_t p);
+
 /// Irradiance at points as a matrix: points x 3.
 Eigen::MatrixXf irradiance_rows(const std::vector<Rgb>& irradiance);
 

@@ -3,7 +3,6 @@
 #include "base/parallel.h"
 
 #include <algorithm>
-#include <tuple>
 
 namespace vitrine {
 
@@ -83,14 +82,10 @@ LightPaths::LightPaths(const LitRelief& object) : step_px_(object.samples().step
     const ReliefObservations& observations = object.observations();
     std::size_t path_count = 0;
     for (std::size_t p = 0; p < observations.position.size(); ++p) {
-        auto begin = samples.ball.begin(), end = samples.ball.end();
-        if (!samples.ball.empty())  // samples come ball by ball
-            std::tie(begin, end) = std::equal_range(begin, end, observations.ball[p]);
-        const Index first = begin - samples.ball.begin();
-        const Index count = samples.ball.empty() ? static_cast<Index>(samples.position.size())
-                                                 : static_cast<Index>(end - begin);
-        bundles_.push_back({first, count, path_count});
-        path_count += static_cast<std::size_t>(count);
+        const SampleRange about = samples_about(samples, observations, p);
+        bundles_.push_back({static_cast<Index>(about.first),
+                            static_cast<Index>(about.last - about.first), path_count});
+        path_count += about.last - about.first;
     }
     distance_.resize(path_count);
     rise_.resize(path_count);

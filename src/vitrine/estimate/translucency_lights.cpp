@@ -382,8 +382,8 @@ ViewLightsEstimate estimate_translucency_lights(const ImageRgb& diffuse, const R
         starts[0].seen_at.push_back(is_held[l] ? SeenAt(direction) : std::nullopt);
     }
     if (!options.known_lamps.empty()) {
-        starts.push_back({options.known_lamps,
-                          std::vector<SeenAt>(options.known_lamps.size(), std::nullopt)});
+        starts.push_back(
+            {options.known_lamps, std::vector<SeenAt>(options.known_lamps.size(), std::nullopt)});
     }
     std::vector<LampVote> votes;
     if (use_votes) {

@@ -36,8 +36,8 @@ struct TranslucencyLightOptions {
     /// Of one body: the likeliest lamps by shading and highlights together. False: the lamps that
     /// explain its shading best on the shape as it is taken for, whose errors they take up.
     bool use_votes = true;
-    std::vector<Vec3> known_lamps;  ///< another place to begin the search at; may be empty
-    std::uint64_t seed = 1;  ///< of the choice of pixels
+    std::vector<Vec3> known_lamps = {};  ///< another place to begin the search at; may be empty
+    std::uint64_t seed = 1;              ///< of the choice of pixels
 };
 
 struct ViewLightsEstimate {
