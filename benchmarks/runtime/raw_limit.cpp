@@ -21,22 +21,23 @@ template <typename Run>
 void compare(const char* name, const Run& run) {
     start_recording();
     run();
-    const std::vector<RecordedRay> rays = stop_recording();
+    const RecordedRays recorded = stop_recording();
     std::size_t occlusions = 0;
-    for (const RecordedRay& ray : rays) occlusions += ray.is_occlusion ? 1 : 0;
+    for (const RecordedCall& call : recorded.calls)
+        occlusions += call.is_occlusion ? call.count : 0;
     ReplaySums sums;
     std::vector<double> ours, bare, apart, ratios;
     for (int i = 0; i < kRepeats; ++i) {
         ours.push_back(cost_of(run).cpu_s);
-        bare.push_back(cost_of([&] { sums = replay(rays); }).cpu_s);
-        apart.push_back(cost_of([&] { sums = replay_apart(rays); }).cpu_s);
+        bare.push_back(cost_of([&] { sums = replay(recorded); }).cpu_s);
+        apart.push_back(cost_of([&] { sums = replay_apart(recorded); }).cpu_s);
         ratios.push_back(bare.back() / ours.back());
     }
-    const auto n = static_cast<double>(rays.size());
+    const auto n = static_cast<double>(recorded.rays.size());
     std::printf(
         "%-34s %8zu rays (%2.0f %% occlusion, %2.0f %% hits)  bare %.0f ns/ray (one by one "
         "%.0f)  ours %.0f ns/ray  ratio %.3f\n",
-        name, rays.size(), 100 * static_cast<double>(occlusions) / n,
+        name, recorded.rays.size(), 100 * static_cast<double>(occlusions) / n,
         100 * static_cast<double>(sums.hits) / n, 1e9 * median(bare) / n, 1e9 * median(apart) / n,
         1e9 * median(ours) / n, median(ratios));
     std::fflush(stdout);

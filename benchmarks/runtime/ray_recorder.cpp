@@ -6,7 +6,7 @@ namespace vitrine {
 namespace {
 
 bool is_recording = false;
-std::vector<RecordedRay> list;
+RecordedRays list;
 
 using Intersect = void (*)(RTCScene, RTCIntersectContext*, RTCRayHit*);
 using Occluded = void (*)(RTCScene, RTCIntersectContext*, RTCRay*);
@@ -21,20 +21,36 @@ const auto embree_occluded = reinterpret_cast<Occluded>(dlsym(RTLD_NEXT, "rtcOcc
 }  // namespace
 
 void start_recording() {
-    list.clear();
+    list = {};
     is_recording = true;
 }
 
-std::vector<RecordedRay> stop_recording() {
+RecordedRays stop_recording() {
     is_recording = false;
     return std::move(list);
 }
 
+/// @param ray_at gives a pointer to ray i
+template <typename RayAt>
+void record(const RecordedCall& call, const RayAt& ray_at) {
+    if (!is_recording) return;
+    for (std::size_t i = 0; i < call.count; ++i) list.rays.push_back(*ray_at(i));
+    if (!call.is_stream && !list.calls.empty()) {
+        RecordedCall& last = list.calls.back();
+        if (!last.is_stream && last.scene == call.scene && last.is_occlusion == call.is_occlusion &&
+            last.context.flags == call.context.flags) {
+            last.count += call.count;
+            return;
+        }
+    }
+    list.calls.push_back(call);
+}
+
 namespace {
 
-RTCRayHit start_of(const RecordedRay& recorded) {
+RTCRayHit start_of(const RTCRay& ray) {
     RTCRayHit hit;
-    hit.ray = recorded.ray;
+    hit.ray = ray;
     hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     hit.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
     return hit;
@@ -48,78 +64,82 @@ void count(const RTCRayHit& hit, ReplaySums& sums) {
 
 void count(const RTCRay& ray, ReplaySums& sums) { sums.hits += ray.tfar < 0 ? 1 : 0; }
 
-void send_one(const RecordedRay& recorded, ReplaySums& sums) {
-    RTCIntersectContext context = recorded.context;
-    if (recorded.is_occlusion) {
-        RTCRay ray = recorded.ray;
-        embree_occluded(recorded.scene, &context, &ray);
+void send_one(const RecordedCall& call, const RTCRay& recorded, ReplaySums& sums) {
+    RTCIntersectContext context = call.context;
+    if (call.is_occlusion) {
+        RTCRay ray = recorded;
+        embree_occluded(call.scene, &context, &ray);
         count(ray, sums);
         return;
     }
     RTCRayHit hit = start_of(recorded);
-    embree_intersect(recorded.scene, &context, &hit);
+    embree_intersect(call.scene, &context, &hit);
     count(hit, sums);
+}
+
+void send_stream(const RecordedCall& call, const RTCRay* rays, std::vector<RTCRayHit>& hits,
+                 std::vector<RTCRay>& shadows, ReplaySums& sums) {
+    RTCIntersectContext context = call.context;
+    const auto number = static_cast<unsigned>(call.count);
+    if (call.is_occlusion) {
+        shadows.assign(rays, rays + call.count);
+        embree_occluded_stream(call.scene, &context, shadows.data(), number, sizeof(RTCRay));
+        for (const RTCRay& ray : shadows) count(ray, sums);
+        return;
+    }
+    hits.resize(call.count);
+    for (std::size_t k = 0; k < call.count; ++k) hits[k] = start_of(rays[k]);
+    embree_stream(call.scene, &context, hits.data(), number, sizeof(RTCRayHit));
+    for (const RTCRayHit& hit : hits) count(hit, sums);
 }
 
 }  // namespace
 
-ReplaySums replay(const std::vector<RecordedRay>& rays) {
+ReplaySums replay(const RecordedRays& recorded) {
     ReplaySums sums;
     std::vector<RTCRayHit> hits;
     std::vector<RTCRay> shadows;
-    for (std::size_t i = 0; i < rays.size(); i += rays[i].stream) {
-        const RecordedRay& first = rays[i];
-        if (first.stream == 1) {
-            send_one(first, sums);
-            continue;
+    const RTCRay* rays = recorded.rays.data();
+    for (const RecordedCall& call : recorded.calls) {
+        if (call.is_stream) send_stream(call, rays, hits, shadows, sums);
+        for (std::size_t k = 0; !call.is_stream && k < call.count; ++k) {
+            send_one(call, rays[k], sums);
         }
-        RTCIntersectContext context = first.context;
-        if (first.is_occlusion) {
-            shadows.resize(first.stream);
-            for (std::size_t k = 0; k < shadows.size(); ++k) shadows[k] = rays[i + k].ray;
-            embree_occluded_stream(first.scene, &context, shadows.data(), first.stream,
-                                   sizeof(RTCRay));
-            for (const RTCRay& ray : shadows) count(ray, sums);
-            continue;
-        }
-        hits.resize(first.stream);
-        for (std::size_t k = 0; k < hits.size(); ++k) hits[k] = start_of(rays[i + k]);
-        embree_stream(first.scene, &context, hits.data(), first.stream, sizeof(RTCRayHit));
-        for (const RTCRayHit& hit : hits) count(hit, sums);
+        rays += call.count;
     }
     return sums;
 }
 
-ReplaySums replay_apart(const std::vector<RecordedRay>& rays) {
+ReplaySums replay_apart(const RecordedRays& recorded) {
     ReplaySums sums;
-    for (const RecordedRay& ray : rays) send_one(ray, sums);
+    const RTCRay* rays = recorded.rays.data();
+    for (const RecordedCall& call : recorded.calls) {
+        for (std::size_t k = 0; k < call.count; ++k) send_one(call, *rays++, sums);
+    }
     return sums;
 }
 
 }  // namespace vitrine
 
 extern "C" void rtcIntersect1(RTCScene scene, RTCIntersectContext* context, RTCRayHit* hit) {
-    if (vitrine::is_recording) vitrine::list.push_back({hit->ray, scene, *context, false, 1});
+    vitrine::record({scene, *context, false, false, 1}, [&](std::size_t) { return &hit->ray; });
     vitrine::embree_intersect(scene, context, hit);
 }
 
 extern "C" void rtcOccluded1(RTCScene scene, RTCIntersectContext* context, RTCRay* ray) {
-    if (vitrine::is_recording) vitrine::list.push_back({*ray, scene, *context, true, 1});
+    vitrine::record({scene, *context, true, false, 1}, [&](std::size_t) { return ray; });
     vitrine::embree_occluded(scene, context, ray);
 }
 
 extern "C" void rtcIntersect1M(RTCScene scene, RTCIntersectContext* context, RTCRayHit* hits,
                                unsigned count, std::size_t stride) {
-    for (unsigned i = 0; vitrine::is_recording && i < count; ++i) {
-        vitrine::list.push_back({hits[i].ray, scene, *context, false, i == 0 ? count : 0});
-    }
+    vitrine::record({scene, *context, false, true, count},
+                    [&](std::size_t i) { return &hits[i].ray; });
     vitrine::embree_stream(scene, context, hits, count, stride);
 }
 
 extern "C" void rtcOccluded1M(RTCScene scene, RTCIntersectContext* context, RTCRay* rays,
                               unsigned count, std::size_t stride) {
-    for (unsigned i = 0; vitrine::is_recording && i < count; ++i) {
-        vitrine::list.push_back({rays[i], scene, *context, true, i == 0 ? count : 0});
-    }
+    vitrine::record({scene, *context, true, true, count}, [&](std::size_t i) { return &rays[i]; });
     vitrine::embree_occluded_stream(scene, context, rays, count, stride);
 }

@@ -14,25 +14,32 @@
 
 namespace vitrine {
 
-struct RecordedRay {
-    RTCRay ray;  ///< as it was handed in
+/// Rays sent by one call, or by neighbouring calls of a ray each that are alike.
+struct RecordedCall {
     RTCScene scene;
     RTCIntersectContext context;
     bool is_occlusion;
-    std::size_t stream;  ///< rays of the call that this one begins; 0: it belongs to one before
+    bool is_stream;     ///< by one call, else one by one
+    std::size_t count;  ///< of rays
+};
+
+/// Rays lie packed, so that to read them costs next to nothing.
+struct RecordedRays {
+    std::vector<RTCRay> rays;  ///< as they were handed in
+    std::vector<RecordedCall> calls;
 };
 
 /// Starts with an empty list.
 void start_recording();
-std::vector<RecordedRay> stop_recording();
+RecordedRays stop_recording();
 
 struct ReplaySums {
     double distance = 0;  ///< of the hits: keeps the work from being left out
     std::size_t hits = 0;
 };
 /// Sends the rays of the list again, by the same calls.
-ReplaySums replay(const std::vector<RecordedRay>& rays);
+ReplaySums replay(const RecordedRays& recorded);
 /// Sends all one by one, those of streams too.
-ReplaySums replay_apart(const std::vector<RecordedRay>& rays);
+ReplaySums replay_apart(const RecordedRays& recorded);
 
 }  // namespace vitrine

@@ -2,6 +2,7 @@
 
 #include "base/wide.h"
 #include "render/interface.h"
+#include "render/lane_steps.h"
 
 #include <cmath>
 
@@ -10,14 +11,6 @@ namespace {
 
 /// Faint branches of a boundary survive with this many times their share of the power.
 constexpr float kFaintBranchBoost = 4.0f;
-/// The share of a photon's first power below which it is left to chance at all.
-constexpr float kSurePower = 0.25f;
-
-// In the order in which Eigen sums, so that lanes have the bits of single points.
-inline float dot(float ax, float ay, float az, float bx, float by, float bz) {
-    return ax * bx + (ay * by + az * bz);
-}
-
 inline float sum(float a, float b, float c) { return a + (b + c); }
 
 inline float strongest(float a, float b, float c) { return std::max(a, std::max(b, c)); }

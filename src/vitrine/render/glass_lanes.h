@@ -6,6 +6,9 @@
 
 namespace vitrine {
 
+/// The share of a photon's first power below which a ray of it is left to chance.
+constexpr float kSurePower = 0.25f;
+
 /// One of the two rays that leave a boundary.
 struct BranchLanes {
     Lanes3 power;

@@ -4,6 +4,7 @@
 #include "base/rng.h"
 #include "geometry/primitives.h"
 #include "render/medium_table.h"
+#include "render/packed_lanes.h"
 
 #include <gtest/gtest.h>
 
@@ -135,6 +136,23 @@ TEST(GlassLanes, ChanceChangesNoMean) {
         const auto bound = [&](double mean) { return 5 * std::sqrt(0.125 * mean / kDraws) + 1e-5; };
         EXPECT_NEAR(reflected[lane(i)], r * power, bound(r * power));
         EXPECT_NEAR(refracted[lane(i)], (1 - r) * power, bound((1 - r) * power));
+    }
+}
+
+TEST(PackedLanes, DirectionsArePackedAsOneAlone) {
+    Rng rng(2);
+    for (const float sign : {1.0f, -1.0f}) {
+        Lanes3 unit = {};
+        for (int i = 0; i < kCount; ++i) unit.set(i, random_direction(rng));
+        for (int axis = 0; axis < 3; ++axis) unit.set(axis, Vec3f::Unit(axis));
+        for (int axis = 0; axis < 3; ++axis) unit.set(3 + axis, -Vec3f::Unit(axis));
+        PackedLanes packed;
+        pack_directions(unit, sign, packed, kCount);
+        for (int i = 0; i < kCount; ++i) {
+            const PackedDirection expected(sign * unit.at(i));
+            EXPECT_EQ(packed.at(i).x, expected.x);
+            EXPECT_EQ(packed.at(i).y, expected.y);
+        }
     }
 }
 

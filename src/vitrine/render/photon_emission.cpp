@@ -3,6 +3,7 @@
 #include "base/parallel.h"
 #include "base/wide.h"
 #include "math/sampling_steps.h"
+#include "render/lane_steps.h"
 #include "render/sampler.h"
 
 #include <cmath>
@@ -28,11 +29,6 @@ struct LightRandom {
     }
     void draw(int count) { random_pairs(random, 0, u, v, count); }
 };
-
-// In the order in which Eigen sums, so that lanes have the bits of single photons.
-inline float dot(float ax, float ay, float az, float bx, float by, float bz) {
-    return ax * bx + (ay * by + az * bz);
-}
 
 /// Rays from `photons.origin` into the cone around the target.
 /// @param count of the target's photons
@@ -66,12 +62,7 @@ VITRINE_WIDE void aim_at_sphere(const Sphere& sphere, const LaneLight& light, fl
         const float r = std::sqrt(rest > 0 ? rest : 0.0f);
         const SineCosine turn = sine_cosine_of_turn(v[i]);
         const float x = r * turn.cosine, y = r * turn.sine, z = 1.0f - one_minus_z;
-        // Frame of math/rigid3.h.
-        const float sign = std::copysign(1.0f, nz);
-        const float a = -1.0f / (sign + nz);
-        const float b = nx * ny * a;
-        const float tx = 1.0f + sign * nx * nx * a, ty = sign * b, tz = -sign * nx;
-        const float bx = b, by = sign + ny * ny * a, bz = -ny;
+        const auto [tx, ty, tz, bx, by, bz] = tangents(nx, ny, nz);
         const float dx = tx * x + bx * y + nx * z;
         const float dy = ty * x + by * y + ny * z;
         const float dz = tz * x + bz * y + nz * z;

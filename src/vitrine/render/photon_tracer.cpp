@@ -1,10 +1,9 @@
 #include "render/photon_tracer.h"
 
+#include "render/packed_lanes.h"
+
 namespace vitrine {
 namespace {
-
-/// The share of a photon's first power below which a flight is left to chance.
-constexpr float kSurePower = 0.25f;
 
 // Random numbers of a vertex.
 constexpr int kInterfaceUse = 2;
@@ -119,7 +118,6 @@ void PhotonTracer::sort_out(const PhotonTarget& target, int depth, PhotonGroup& 
             if (depth > 0 && !flight.has_arrived) balance.escaped += flight.power.sum();
             continue;
         }
-        scene_.prefetch_triangle(hit);
         const Receiver& receiver = receivers_[static_cast<std::size_t>(hit.part)];
         if (receiver.is_virtual) group.is_touched[flight.slot] = 1;
         if (depth == 0) {
@@ -150,7 +148,6 @@ void PhotonTracer::sort_out(const PhotonTarget& target, int depth, PhotonGroup& 
 void PhotonTracer::find_surfaces(std::span<const std::uint32_t> numbers, PhotonGroup& group) const {
     const int count = static_cast<int>(numbers.size());
     PlainLanes& surfaces = group.surfaces_;
-    for (int i = 0; i < count; ++i) scene_.prefetch_vertices(group.hits_[numbers[lane(i)]]);
     for (int i = 0; i < count; ++i) {
         const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         const Hit& hit = group.hits_[numbers[lane(i)]];
@@ -215,7 +212,10 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
                                PhotonGroup& group) const {
     const int count = static_cast<int>(numbers.size());
     PlainLanes& surfaces = group.surfaces_;
+    PackedLanes to_light, normals;
     find_surfaces(numbers, group);
+    pack_directions(surfaces.direction, -1.0f, to_light, count);
+    pack_directions(surfaces.geometric, 1.0f, normals, count);
     for (int i = 0; i < count; ++i) {
         const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         const Hit& hit = group.hits_[numbers[lane(i)]];
@@ -223,16 +223,22 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
             group.arrivals.emplace_back(receivers_[static_cast<std::size_t>(hit.part)].photon);
         photon.position = surfaces.position.at(i);
         photon.power = surfaces.throughput.at(i).array();
-        photon.to_light = PackedDirection(-surfaces.direction.at(i));
-        photon.normal = PackedDirection(surfaces.geometric.at(i));
+        photon.to_light = to_light.at(i);
+        photon.normal = normals.at(i);
         if (!scene_.shape(hit.part).has_one_albedo) {
             photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
         }
-        photon.views = static_cast<std::uint8_t>(view);
-        photon.is_glossy = flight.is_glossy;
-        group.slots.push_back(flight.slot);
-        if (!flight.has_arrived) group.balance.stored += photon.power.sum();
+        finish(photon, flight, view, group);
     }
+}
+
+/// What arrivals of all kinds share.
+void PhotonTracer::finish(Photon& photon, const Flight& flight, std::uint32_t view,
+                          PhotonGroup& group) {
+    photon.views = static_cast<std::uint8_t>(view);
+    photon.is_glossy = flight.is_glossy;
+    group.slots.push_back(flight.slot);
+    if (!flight.has_arrived) group.balance.stored += photon.power.sum();
 }
 
 /// Surfaces of other kinds; false when the flight ends.
@@ -257,11 +263,8 @@ bool PhotonTracer::step(Flight& flight, Ray& ray, const Hit& hit, const PhotonTa
         photon.to_light = PackedDirection(-ray.direction);
         photon.normal = PackedDirection(point.geometric_normal);
         photon.set_diffuse_albedo(diffuse_reflectance(bsdf));
-        photon.views = static_cast<std::uint8_t>(view);
-        photon.is_glossy = flight.is_glossy;
         photon.keeps_direction = true;
-        group.slots.push_back(flight.slot);
-        if (!flight.has_arrived) group.balance.stored += flight.power.sum();
+        finish(photon, flight, view, group);
         flight.has_arrived = true;
     }
     if (!(lobe_probability(bsdf, Lobe::Glossy) > 0)) return false;

@@ -90,6 +90,8 @@ class PhotonTracer {
                     std::span<const std::uint32_t> numbers, PhotonGroup& group) const;
     void store_plain(std::uint32_t view, std::span<const std::uint32_t> numbers,
                      PhotonGroup& group) const;
+    static void finish(Photon& photon, const Flight& flight, std::uint32_t view,
+                       PhotonGroup& group);
     bool step(Flight& flight, Ray& ray, const Hit& hit, const PhotonTarget& target, int depth,
               std::uint32_t view, PhotonGroup& group) const;
     bool scatter(Flight& flight, Ray& ray, const ShadingPoint& point, const Bsdf& bsdf, int depth,

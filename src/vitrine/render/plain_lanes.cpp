@@ -3,6 +3,7 @@
 #include "base/rng.h"
 #include "base/wide.h"
 #include "math/sampling_steps.h"
+#include "render/lane_steps.h"
 #include "render/sampler.h"
 
 #include <cmath>
@@ -10,11 +11,6 @@
 
 namespace vitrine {
 namespace {
-
-// In the order in which Eigen sums, so that lanes have the bits of single points.
-inline float dot(float ax, float ay, float az, float bx, float by, float bz) {
-    return ax * bx + (ay * by + az * bz);
-}
 
 inline float interpolated(float a, float b, float c, float wa, float wb, float wc) {
     return a * wa + b * wb + c * wc;
@@ -109,29 +105,54 @@ VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
     }
 }
 
-VITRINE_WIDE void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<float>& u,
-                               Lane<float>& v, int count) {
-    const int n = whole_steps(count);
-    Lane<std::uint64_t> key;
+namespace {
+
+VITRINE_WIDE void stratified_pairs(const RandomLanes& random, const Lane<std::uint64_t>& key,
+                                   std::uint32_t k, Lane<float>& u, Lane<float>& v, int n) {
     Lane<std::uint32_t> seed;
-    std::uint32_t deepest = 0;
-    for (int i = 0; i < n; ++i) {
-        key[i] = mix_bits(random.stream[i] ^ (random.depth[i] * 16u + random.use[i]));
-    }
     for (int i = 0; i < n; ++i) seed[i] = static_cast<std::uint32_t>(key[i]);
     for (int i = 0; i < n; ++i) {
         const SobolBits bits = scrambled_sobol_bits(random.index[i] * random.of[i] + k, seed[i]);
         u[i] = unit_float(bits.x);
         v[i] = unit_float(bits.y);
     }
-    for (int i = 0; i < count; ++i) deepest = std::max(deepest, random.depth[i]);
-    if (deepest <= PathSampler::kStratifiedDepth) return;
-    for (int i = 0; i < count; ++i) {
-        if (random.depth[i] <= PathSampler::kStratifiedDepth) continue;
-        const Vec2f pair = PathSampler::unstratified(key[i], random.index[i] * random.of[i] + k);
-        u[i] = pair.x();
-        v[i] = pair.y();
+}
+
+/// Of the deeper vertices alone.
+VITRINE_WIDE void unstratified_pairs(const RandomLanes& random, const Lane<std::uint64_t>& key,
+                                     std::uint32_t k, Lane<float>& u, Lane<float>& v, int n) {
+    Lane<std::uint64_t> bits;
+    Lane<std::uint32_t> high, low;
+    for (int i = 0; i < n; ++i) {
+        bits[i] = PathSampler::bits_of(key[i], random.index[i] * random.of[i] + k);
     }
+    for (int i = 0; i < n; ++i) {
+        high[i] = static_cast<std::uint32_t>(bits[i] >> 32);
+        low[i] = static_cast<std::uint32_t>(bits[i] >> 8);
+    }
+    for (int i = 0; i < n; ++i) {
+        const bool is_deep = random.depth[i] > PathSampler::kStratifiedDepth;
+        u[i] = is_deep ? unit_float(high[i]) : u[i];
+        v[i] = is_deep ? unit_float(low[i]) : v[i];
+    }
+}
+
+}  // namespace
+
+VITRINE_WIDE void random_pairs(const RandomLanes& random, std::uint32_t k, Lane<float>& u,
+                               Lane<float>& v, int count) {
+    const int n = whole_steps(count);
+    Lane<std::uint64_t> key;
+    std::uint32_t deepest = 0, shallowest = PathSampler::kStratifiedDepth + 1;
+    for (int i = 0; i < n; ++i) {
+        key[i] = mix_bits(random.stream[i] ^ (random.depth[i] * 16u + random.use[i]));
+    }
+    for (int i = 0; i < count; ++i) {
+        deepest = std::max(deepest, random.depth[i]);
+        shallowest = std::min(shallowest, random.depth[i]);
+    }
+    if (shallowest <= PathSampler::kStratifiedDepth) stratified_pairs(random, key, k, u, v, n);
+    if (deepest > PathSampler::kStratifiedDepth) unstratified_pairs(random, key, k, u, v, n);
 }
 
 std::optional<LaneLight> lane_light(const Light& light) {
@@ -230,13 +251,8 @@ VITRINE_WIDE void scatter_lanes(PlainLanes& lanes, int count) {
         concentric_disc(lanes.u[i], lanes.v[i], dx, dy);
         const float rest = 1.0f - (dx * dx + dy * dy);
         const float up = std::sqrt(rest > 0 ? rest : 0.0f);
-        // Frame of math/rigid3.h.
         const float nx = lanes.shading.x[i], ny = lanes.shading.y[i], nz = lanes.shading.z[i];
-        const float sign = std::copysign(1.0f, nz);
-        const float a = -1.0f / (sign + nz);
-        const float b = nx * ny * a;
-        const float tx = 1.0f + sign * nx * nx * a, ty = sign * b, tz = -sign * nx;
-        const float bx = b, by = sign + ny * ny * a, bz = -ny;
+        const auto [tx, ty, tz, bx, by, bz] = tangents(nx, ny, nz);
         const float x = tx * dx + bx * dy + nx * up;
         const float y = ty * dx + by * dy + ny * up;
         const float z = tz * dx + bz * dy + nz * up;

@@ -59,21 +59,22 @@ class PathSampler {
     std::uint32_t index() const { return index_; }
     /// Beyond the second diffuse bounce stratification buys nothing measurable.
     static constexpr int kStratifiedDepth = 3;
-    /// Of the key of a use.
+    /// Beyond it, of the key of a use: the upper 24 bits are the first number, the 24 bits that
+    /// end 16 from below the second.
+    static std::uint64_t bits_of(std::uint64_t key, std::uint32_t index) {
+        return mix_bits(key ^ (std::uint64_t{index} << 32 | index));
+    }
+
+  private:
     static Vec2f unstratified(std::uint64_t key, std::uint32_t index) {
         const std::uint64_t bits = bits_of(key, index);
         return {static_cast<float>(bits >> 40) * 0x1p-24f,
                 static_cast<float>((bits >> 16) & 0xffffffu) * 0x1p-24f};
     }
-
-  private:
     std::uint64_t key_of(int depth,
                          int purpose) const {  // = stream_key(stream, 16 depth + purpose)
         return mix_bits(mixed_stream_ ^
                         (static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose)));
-    }
-    static std::uint64_t bits_of(std::uint64_t key, std::uint32_t index) {
-        return mix_bits(key ^ (std::uint64_t{index} << 32 | index));
     }
 
     std::uint64_t mixed_stream_;
