@@ -74,8 +74,7 @@ TEST(LightPaths, StayWithinTheirBall) {
     fields.local.setZero();
     for (std::size_t i = 0; i < object.samples().ball.size(); ++i)
         if (object.samples().ball[i] == 0) fields.source(static_cast<Eigen::Index>(i), 0) = 0;
-    const MatrixXd image =
-        LightPaths(object).images({plain_exponential(30)}, fields, {}).front();
+    const MatrixXd image = LightPaths(object).images({plain_exponential(30)}, fields, {}).front();
     for (std::size_t p = 0; p < object.observations().ball.size(); ++p) {
         const double value = image(static_cast<Eigen::Index>(p), 0);
         EXPECT_EQ(value > 0, object.observations().ball[p] == 1);

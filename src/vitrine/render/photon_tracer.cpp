@@ -5,6 +5,8 @@
 namespace vitrine {
 namespace {
 
+constexpr int kTogether = 4;
+
 // Random numbers of a vertex.
 constexpr int kInterfaceUse = 2;
 constexpr int kScatterUse = 3;
@@ -47,7 +49,9 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
     group.balance.shot += group.indices.size();
     emit(target, view, group);
     for (int depth = 0; !group.flights_.rays.empty(); ++depth) {
-        meet(depth, group);
+        // The first surfaces are met side by side; behind them neighbours have parted, and Embree's
+        // packets of such rays cost more than the rays one by one.
+        scene_.closest(group.flights_.rays, depth < kTogether);
         sort_out(target, depth, group);
         group.next_.clear();
         group.faint_.clear();
@@ -59,9 +63,11 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
         });
         for (const std::uint32_t i : group.others_) {
             Flight flight = group.flights_.carried[i];
-            Ray ray = group.flights_.rays[i];
-            if (step(flight, ray, group.hits_[i], target, depth, view, group)) {
-                group.next_.push_back(flight, ray);
+            const RayAndHit& met = group.flights_.rays[i];
+            Ray ray{met.ray.origin, met.ray.direction};
+            if (step(flight, ray, hit_of(met), target, depth, view, group)) {
+                group.next_.carried.push_back(flight);
+                group.next_.rays.emplace_back(ray.origin, ray.direction, view);
             }
         }
         // The faint branches of neighbours are neighbours too.
@@ -84,36 +90,22 @@ void PhotonTracer::emit(const PhotonTarget& target, std::uint32_t view, PhotonGr
             const Rgb power = photons.power.at(i).array();
             const float initial = power.maxCoeff();
             if (!(initial > 0)) continue;
-            Flight flight;
+            group.flights_.rays.emplace_back(photons.origin.at(i), photons.direction.at(i), view);
+            Flight& flight = group.flights_.carried.emplace_back();
             flight.power = power;
             flight.initial = initial;
             flight.slot = static_cast<std::uint32_t>(begin) + static_cast<std::uint32_t>(i);
-            group.flights_.push_back(
-                flight, {photons.origin.at(i), photons.direction.at(i), 0.0f, 1e30f, view});
         }
     }
-}
-
-/// What the flights meet. The first surfaces are met side by side; behind them neighbours have
-/// parted, and Embree's packets of such rays cost more than the rays one by one.
-void PhotonTracer::meet(int depth, PhotonGroup& group) const {
-    constexpr int kTogether = 4;
-    const std::vector<Ray>& rays = group.flights_.rays;
-    group.hits_.resize(rays.size());
-    if (depth < kTogether) {
-        scene_.closest(rays, group.hits_);
-        return;
-    }
-    for (std::size_t i = 0; i < rays.size(); ++i) group.hits_[i] = scene_.closest(rays[i]);
 }
 
 /// Ends the flights that met nothing that counts, and lists the others by what they met.
 void PhotonTracer::sort_out(const PhotonTarget& target, int depth, PhotonGroup& group) const {
     for (auto* list : {&group.glass_, &group.plain_, &group.others_}) list->clear();
     PhotonBalance& balance = group.balance;
-    for (std::size_t i = 0; i < group.hits_.size(); ++i) {
+    for (std::size_t i = 0; i < group.flights_.rays.size(); ++i) {
         const Flight& flight = group.flights_.carried[i];
-        const Hit& hit = group.hits_[i];
+        const RayAndHit& hit = group.flights_.rays[i];
         if (!hit.is_hit()) {
             if (depth > 0 && !flight.has_arrived) balance.escaped += flight.power.sum();
             continue;
@@ -150,18 +142,18 @@ void PhotonTracer::find_surfaces(std::span<const std::uint32_t> numbers, PhotonG
     PlainLanes& surfaces = group.surfaces_;
     for (int i = 0; i < count; ++i) {
         const Flight& flight = group.flights_.carried[numbers[lane(i)]];
-        const Hit& hit = group.hits_[numbers[lane(i)]];
-        set_hit(surfaces, i, scene_.shape(hit.part), hit,
-                group.flights_.rays[numbers[lane(i)]].direction);
+        const RayAndHit& hit = group.flights_.rays[numbers[lane(i)]];
+        set_hit(surfaces, i, scene_.shape(hit.part), hit, hit.ray.direction);
         Rgb power = flight.power;
         if (group.media_.absorbs(flight.medium)) {
-            power *= scene_.transmittance(group.media_.media(flight.medium), hit.distance);
+            power *= scene_.transmittance(group.media_.media(flight.medium), hit.distance());
             if (!flight.has_arrived) {
                 group.balance.absorbed += double(flight.power.sum()) - double(power.sum());
             }
         }
         surfaces.throughput.set(i, power);
     }
+    normalize_facets(surfaces, count);
     vitrine::find_surfaces(surfaces, count);
 }
 
@@ -180,7 +172,7 @@ void PhotonTracer::pass_glass(const PhotonTarget& target, int depth, std::uint32
         const Flight& flight = group.flights_.carried[numbers[lane(i)]];
         surfaces.random.index[lane(i)] = group.indices[flight.slot];
         const MediumTable::Crossing crossing = group.media_.cross(
-            flight.medium, group.hits_[numbers[lane(i)]].part, surfaces.side[lane(i)] > 0);
+            flight.medium, group.flights_.rays[numbers[lane(i)]].part, surfaces.side[lane(i)] > 0);
         beyond[lane(i)] = crossing.beyond;
         glass.eta[lane(i)] = crossing.eta;
         glass.initial[lane(i)] = flight.initial;
@@ -193,9 +185,8 @@ void PhotonTracer::pass_glass(const PhotonTarget& target, int depth, std::uint32
         const bool is_refracted = branch.is_refracted[lane(i)] != 0;
         // `RenderScene::leave`: a refracted ray always leaves for below, a reflected one for above.
         const float side = is_refracted ? -scene_.epsilon() : scene_.epsilon();
-        flights.rays.push_back({surfaces.position.at(i) + side * surfaces.geometric.at(i),
-                                (is_refracted ? glass.refracted : glass.reflected).at(i), 0.0f,
-                                1e30f, view});
+        flights.rays.emplace_back(surfaces.position.at(i) + side * surfaces.geometric.at(i),
+                                  (is_refracted ? glass.refracted : glass.reflected).at(i), view);
         Flight& flight = flights.carried.emplace_back(from);
         flight.power = branch.power.at(i).array();
         if (is_refracted) flight.medium = beyond[lane(i)];
@@ -218,7 +209,7 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
     pack_directions(surfaces.geometric, 1.0f, normals, count);
     for (int i = 0; i < count; ++i) {
         const Flight& flight = group.flights_.carried[numbers[lane(i)]];
-        const Hit& hit = group.hits_[numbers[lane(i)]];
+        const RayAndHit& hit = group.flights_.rays[numbers[lane(i)]];
         Photon& photon =
             group.arrivals.emplace_back(receivers_[static_cast<std::size_t>(hit.part)].photon);
         photon.position = surfaces.position.at(i);
@@ -226,7 +217,7 @@ void PhotonTracer::store_plain(std::uint32_t view, std::span<const std::uint32_t
         photon.to_light = to_light.at(i);
         photon.normal = normals.at(i);
         if (!scene_.shape(hit.part).has_one_albedo) {
-            photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit));
+            photon.set_diffuse_albedo(scene_.diffuse_albedo(hit.part, hit_of(hit)));
         }
         finish(photon, flight, view, group);
     }

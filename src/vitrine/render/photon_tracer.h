@@ -38,15 +38,11 @@ class PhotonGroup {
 
     struct Flights {
         std::vector<Flight> carried;
-        std::vector<Ray> rays;  // apart, as they are asked for together
+        std::vector<RayAndHit> rays;  // apart, as they are asked for together
 
         void clear() {
             carried.clear();
             rays.clear();
-        }
-        void push_back(const Flight& flight, const Ray& ray) {
-            carried.push_back(flight);
-            rays.push_back(ray);
         }
         void append(const Flights& others) {
             carried.insert(carried.end(), others.carried.begin(), others.carried.end());
@@ -55,7 +51,6 @@ class PhotonGroup {
     };
 
     Flights flights_, next_, faint_;
-    std::vector<Hit> hits_;
     std::vector<std::uint32_t> glass_, plain_, others_;  // numbers of the flights that met such
     MediumTable media_;
     EmittedLanes emitted_ = {};
@@ -83,7 +78,6 @@ class PhotonTracer {
     };
 
     void emit(const PhotonTarget& target, std::uint32_t view, PhotonGroup& group) const;
-    void meet(int depth, PhotonGroup& group) const;
     void sort_out(const PhotonTarget& target, int depth, PhotonGroup& group) const;
     void find_surfaces(std::span<const std::uint32_t> numbers, PhotonGroup& group) const;
     void pass_glass(const PhotonTarget& target, int depth, std::uint32_t view,

@@ -18,7 +18,7 @@ struct alignas(16) BareRay {
     float min_distance = 0.0f;
     Vec3f direction;  ///< need not be unit: distances are in its length
     float time = 0.0f;
-    float max_distance = 1e30f;       ///< once answered: negative where something is in the way
+    float max_distance = 1e30f;        ///< once answered: negative where something is in the way
     std::uint32_t mask = 0xffffffffu;  ///< hits parts with (part mask & ray mask) != 0
     std::uint32_t id = 0, flags = 0;
 
@@ -31,9 +31,9 @@ struct alignas(16) RayAndHit {
     RayAndHit(const Vec3f& from, const Vec3f& along, std::uint32_t its_mask)
         : ray(from, along, 1e30f, its_mask) {}
 
-    BareRay ray;          ///< `max_distance`: to the hit
-    Vec3f normal;         ///< geometric, outward by the triangle's winding, of any length
-    Vec2f barycentric;    ///< weights of vertices 1 and 2
+    BareRay ray;        ///< `max_distance`: to the hit
+    Vec3f normal;       ///< geometric, outward by the triangle's winding, of any length
+    Vec2f barycentric;  ///< weights of vertices 1 and 2
     std::int32_t triangle;
     std::int32_t part = -1;  ///< index of the mesh; -1: nothing hit
     std::int32_t instance = -1;
