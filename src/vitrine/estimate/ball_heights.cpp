@@ -136,21 +136,12 @@ class Heights {
     }
 
     Solution solve(const std::vector<MatrixXd>& images) const {
-        const Index count = images[0].cols();
-        MatrixXd gram = MatrixXd::Zero(count, count);
-        VectorXd h = VectorXd::Zero(count);
-        double yy = 0;
-        for (std::size_t k = 0; k < channels_.size(); ++k) {
-            const auto w = weight_.col(channels_[k]);
-            const MatrixXd a = w.asDiagonal() * images[k];
-            const VectorXd b = w.cwiseProduct(y_.col(channels_[k]));
-            gram += a.transpose() * a;
-            h += a.transpose() * b;
-            yy += b.squaredNorm();
-        }
-        gram.diagonal().array() += 1e-9 * gram.diagonal().mean();
-        const VectorXd x = solve_nnls_gram(gram, h).x;
-        return {x, yy + x.dot(gram * x) - 2 * h.dot(x)};
+        IntensityEquations equations(images[0].cols());
+        for (std::size_t k = 0; k < channels_.size(); ++k)
+            equations.add(images[k], y_.col(channels_[k]), weight_.col(channels_[k]));
+        equations.gram.diagonal().array() += 1e-9 * equations.gram.diagonal().mean();
+        const VectorXd x = solve_nnls_gram(equations.gram, equations.right).x;
+        return {x, equations.misfit(x)};
     }
 
     /// Huber's weights, once: stems and skins must not move balls.

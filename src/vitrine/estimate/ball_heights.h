@@ -22,7 +22,7 @@ struct BallHeightOptions {
 /// lamps and kernels that are known, shadows do: pattern search over the heights for the least
 ///   looks / 2 ln(misfit) + sum over pairs ((overlap / overlap_spread)^2 + (gap / gap_spread)^2) /
 ///   2,
-/// intensities fitted anew at every step. Costs some 10 ms per step, 100 to 200 steps.
+/// intensities fitted anew at every step. Costs some 4 ms per step, 100 to 200 steps.
 /// @param excluded highlights
 std::vector<Ball> refine_ball_heights(const Relief& cluster, const ImageRgb& diffuse,
                                       const Mask& excluded, const ViewLightsEstimate& lights,

@@ -158,12 +158,13 @@ Eigen::MatrixXd DistanceHistogram::image_of_nodes(const Eigen::VectorXd& values)
     const std::size_t fields = static_cast<std::size_t>(field_count_);
     parallel_for(observation_count_, 32, [&](std::size_t p) {
         const float* block = &sums_[p * nodes_.size() * fields];
-        Eigen::RowVectorXd sum = Eigen::RowVectorXd::Zero(field_count_);
+        std::vector<double> sum(fields, 0.0);
         for (std::size_t k = 0; k < nodes_.size(); ++k) {
-            const Eigen::Map<const Eigen::RowVectorXf> row(block + k * fields, field_count_);
-            sum += values[static_cast<Eigen::Index>(k)] * row.cast<double>();
+            const double value = values[static_cast<Eigen::Index>(k)];
+            for (std::size_t l = 0; l < fields; ++l) sum[l] += value * block[k * fields + l];
         }
-        result.row(static_cast<Eigen::Index>(p)) = sum;
+        for (std::size_t l = 0; l < fields; ++l)
+            result(static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(l)) = sum[l];
     });
     return result;
 }

@@ -242,17 +242,12 @@ class Fit {
     /// Non-negative least squares over all channels at once; sets the misfit too.
     void solve_intensities(const std::array<MatrixXd, kChannels>& images, FewLamps& lamps) const {
         const Index count = images[0].cols();
-        MatrixXd gram = MatrixXd::Zero(count, count);
-        VectorXd h = VectorXd::Zero(count);
-        double yy = 0;
+        IntensityEquations equations(count);
         for (std::size_t c = 0; c < kChannels; ++c) {
-            const auto w = weight_.col(static_cast<Index>(c));
-            const MatrixXd a = w.asDiagonal() * images[c];
-            const VectorXd b = w.cwiseProduct(y_.col(static_cast<Index>(c)));
-            gram += a.transpose() * a;
-            h += a.transpose() * b;
-            yy += b.squaredNorm();
+            const auto column = static_cast<Index>(c);
+            equations.add(images[c], y_.col(column), weight_.col(column));
         }
+        MatrixXd& gram = equations.gram;
         const double scale = gram.diagonal().cwiseSqrt().mean();
         for (Index l = 0; l < count; ++l) {
             double price = options_.ground_price;
@@ -265,9 +260,8 @@ class Fit {
             }
             gram(l, l) += price * scale * price * scale;
         }
-        lamps.intensity = solve_nnls_gram(gram, h).x;
-        lamps.misfit =
-            yy + lamps.intensity.dot(gram * lamps.intensity) - 2 * h.dot(lamps.intensity);
+        lamps.intensity = solve_nnls_gram(gram, equations.right).x;
+        lamps.misfit = equations.misfit(lamps.intensity);
     }
 
     void fit_lengths(const std::array<LengthImages, kChannels>& images, FewLamps& lamps) const {

@@ -194,4 +194,21 @@ Eigen::MatrixXd KernelImage::operator()(const LightFields& fields) const {
     return result;
 }
 
+IntensityEquations::IntensityEquations(Index light_count)
+    : gram(Eigen::MatrixXd::Zero(light_count, light_count)),
+      right(Eigen::VectorXd::Zero(light_count)) {}
+
+void IntensityEquations::add(const Eigen::MatrixXd& image, const Eigen::VectorXd& y,
+                             const Eigen::VectorXd& weight) {
+    const Eigen::MatrixXd a = weight.asDiagonal() * image;
+    const Eigen::VectorXd b = weight.cwiseProduct(y);
+    gram += a.transpose() * a;
+    right += a.transpose() * b;
+    observed += b.squaredNorm();
+}
+
+double IntensityEquations::misfit(const Eigen::VectorXd& intensity) const {
+    return observed + intensity.dot(gram * intensity) - 2 * right.dot(intensity);
+}
+
 }  // namespace vitrine

@@ -89,4 +89,16 @@ class KernelImage {
     double near_ = 0;
 };
 
+/// Normal equations for the intensities of lights that several channels share:
+/// sum_c |w_c (A_c x - y_c)|^2.
+struct IntensityEquations {
+    Eigen::MatrixXd gram;
+    Eigen::VectorXd right;
+    double observed = 0;  ///< sum_c |w_c y_c|^2
+
+    explicit IntensityEquations(Eigen::Index light_count);
+    void add(const Eigen::MatrixXd& image, const Eigen::VectorXd& y, const Eigen::VectorXd& weight);
+    double misfit(const Eigen::VectorXd& intensity) const;
+};
+
 }  // namespace vitrine

@@ -74,6 +74,11 @@ TEST(RadialProfile, TableFollowsTheFit) {
     const RadialProfile table = tabulate({fit, fit, fit}, 0.01, 40);
     EXPECT_NEAR(table.total()[1], fit.total(), 1e-3 * fit.total());
     EXPECT_NEAR(table.cumulative(1.7)[2], fit.cumulative(1.7), 1e-3 * fit.total());
+    const std::vector<double> radii = {0, 0.005, 0.3, 0.3, 1.7, 40, 60};
+    const std::vector<Rgbd> within = table.cumulative(radii);
+    for (std::size_t i = 0; i < radii.size(); ++i)
+        EXPECT_NEAR(within[i][0], table.cumulative(radii[i])[0], 1e-12) << radii[i];
+    EXPECT_EQ(within.front()[0], 0);
     EXPECT_NEAR(table.at(3.33)[0], fit(3.33), 1e-3 * fit(3.33));
     EXPECT_NEAR(table.scaled(3).total()[0], table.total()[0], 1e-9);
     EXPECT_NEAR(table.mean_radius()[0], fit.mean_radius(), 5e-3 * fit.mean_radius());

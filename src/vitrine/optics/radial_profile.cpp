@@ -61,10 +61,13 @@ Rgbd RadialProfile::at(double radius) const {
 }
 
 Rgbd RadialProfile::cumulative(double radius) const {
-    Rgbd sum = Rgbd::Zero();
-    if (r.empty()) return sum;
-    const auto add = [&](double from, double to) {
+    return cumulative(std::span(&radius, 1)).front();
+}
+
+std::vector<Rgbd> RadialProfile::cumulative(std::span<const double> radii) const {
+    const auto between = [&](double from, double to) {
         const int steps = 4;
+        Rgbd sum = Rgbd::Zero();
         for (int i = 0; i < steps; ++i) {  // Simpson on a quarter of the interval
             const double x0 = from + (to - from) * i / steps;
             const double x1 = from + (to - from) * (i + 1) / steps;
@@ -72,16 +75,22 @@ Rgbd RadialProfile::cumulative(double radius) const {
             sum += 2.0 * kPi * (x1 - x0) / 6.0 *
                    (x0 * at(x0) + 4.0 * xm * at(xm) + x1 * at(std::min(x1, r.back())));
         }
+        return sum;
     };
+    std::vector<Rgbd> result;
+    Rgbd sum = Rgbd::Zero();  // within `from`
     double from = 0.0;
-    for (const double node : r) {
-        if (node <= from) continue;
-        const double to = std::min(node, radius);
-        if (to <= from) break;
-        add(from, to);
-        from = to;
+    auto node = r.begin();
+    for (const double radius : radii) {
+        for (; node != r.end() && *node <= radius; ++node) {
+            if (*node <= from) continue;
+            sum += between(from, *node);
+            from = *node;
+        }
+        const bool is_beyond = node == r.end() || radius <= from;
+        result.push_back(is_beyond ? sum : (sum + between(from, radius)).eval());
     }
-    return sum;
+    return result;
 }
 
 Rgbd RadialProfile::total() const { return r.empty() ? Rgbd::Zero().eval() : cumulative(r.back()); }

@@ -38,6 +38,8 @@ struct RadialProfile {
     Rgbd at(double radius) const;
     /// Integral over the disc of radius `radius` (trapezium on the table, refined).
     Rgbd cumulative(double radius) const;
+    /// The same within each of the rising radii, at the cost of one.
+    std::vector<Rgbd> cumulative(std::span<const double> radii) const;
     Rgbd total() const;
     Rgbd mean_radius() const;
     RadialProfile scaled(double factor) const;

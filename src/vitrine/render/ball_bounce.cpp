@@ -8,7 +8,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXf;
 
-constexpr int kPatchesPerBall = 24;
 constexpr int kRays = 40;
 constexpr int kBounces = 12;
 /// Reach of the kernel that spreads light in a ball, in radii.
@@ -24,12 +23,12 @@ std::vector<Vec3f> sphere_directions(int count) {
 }  // namespace
 
 BallBounce::BallBounce(const Relief& cluster)
-    : cluster_(cluster),
-      patch_direction_(sphere_directions(kPatchesPerBall)),
-      ray_(sphere_directions(kRays)),
-      spread_(kPatchesPerBall, kPatchesPerBall) {
+    : cluster_(cluster), ray_(sphere_directions(kRays)), spread_(kPatchesPerBall, kPatchesPerBall) {
+    const std::vector<Vec3f> directions = sphere_directions(kPatchesPerBall);
+    for (Index j = 0; j < kPatchesPerBall; ++j)
+        patch_direction_.row(j) = directions[static_cast<std::size_t>(j)].transpose();
     for (std::size_t k = 0; k < cluster.balls.size() + cluster.unseen_balls.size(); ++k) {
-        for (const Vec3f& n : patch_direction_) {
+        for (const Vec3f& n : directions) {
             normal_.push_back(n);
             position_.push_back(ball_at(k).centre_px + ball_at(k).radius_px * n);
             ball_.push_back(k < cluster.balls.size() ? static_cast<std::int16_t>(k) : -1);
@@ -37,9 +36,7 @@ BallBounce::BallBounce(const Relief& cluster)
     }
     for (Index j = 0; j < kPatchesPerBall; ++j) {
         for (Index i = 0; i < kPatchesPerBall; ++i) {
-            const float r = (patch_direction_[static_cast<std::size_t>(i)] -
-                             patch_direction_[static_cast<std::size_t>(j)])
-                                .norm();
+            const float r = (patch_direction_.row(i) - patch_direction_.row(j)).norm();
             spread_(i, j) = std::exp(-r / kSpread);
         }
         spread_.col(j) /= spread_.col(j).sum();
@@ -55,11 +52,11 @@ const Ball& BallBounce::ball_at(std::size_t k) const {
 }
 
 std::size_t BallBounce::patch_at(std::size_t ball, const Vec3f& point) const {
-    const Vec3f out = point - ball_at(ball).centre_px;
-    std::size_t patch = 0;
-    for (std::size_t j = 1; j < patch_direction_.size(); ++j)
-        if (patch_direction_[j].dot(out) > patch_direction_[patch].dot(out)) patch = j;
-    return ball * patch_direction_.size() + patch;
+    const Eigen::Matrix<float, kPatchesPerBall, 1> along =
+        patch_direction_ * (point - ball_at(ball).centre_px);
+    Index patch = 0;
+    along.maxCoeff(&patch);
+    return ball * kPatchesPerBall + static_cast<std::size_t>(patch);
 }
 
 template <typename OnPatch, typename OnSky>

@@ -34,6 +34,8 @@ class BallBounce {
     View view_from(const SurfacePoints& points) const;
 
   private:
+    static constexpr int kPatchesPerBall = 24;
+
     const Ball& ball_at(std::size_t k) const;
     std::size_t patch_at(std::size_t ball, const Vec3f& point) const;
     template <typename OnPatch, typename OnSky>
@@ -43,7 +45,8 @@ class BallBounce {
     const Relief& cluster_;
     std::vector<Vec3f> position_, normal_;
     std::vector<std::int16_t> ball_;  ///< -1: unseen
-    std::vector<Vec3f> patch_direction_, ray_;
+    std::vector<Vec3f> ray_;
+    Eigen::Matrix<float, kPatchesPerBall, 3> patch_direction_;
     Eigen::MatrixXf spread_;  ///< of one ball, patches x patches: share of what enters that leaves
     Eigen::SparseMatrix<float, Eigen::RowMajor> between_;  ///< patches x patches, as in View
     SkyShares sky_;

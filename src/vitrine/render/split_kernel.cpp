@@ -15,13 +15,16 @@ SplitKernel split_kernel(const RadialProfile& profile, double rho) {
         return value * ((slope.min(0.0) / (2 * rho)) * (r * r - rho * rho)).exp();
     };
     constexpr int kSteps = 64;
+    std::vector<double> edges;
+    for (int i = 0; i <= kSteps; ++i) edges.push_back(rho * i / kSteps);
+    const std::vector<Rgbd> within = profile.cumulative(edges);
     double second_moment = 0, weight = 0;
     for (int i = 0; i < kSteps; ++i) {
-        const double r0 = rho * i / kSteps, r1 = rho * (i + 1) / kSteps, r = 0.5 * (r0 + r1);
+        const auto k = static_cast<std::size_t>(i);
+        const double r0 = edges[k], r1 = edges[k + 1], r = 0.5 * (r0 + r1);
         split.far.r.push_back(r0);
         split.far.rd.push_back(cap(r0));
-        const Rgbd ring =
-            profile.cumulative(r1) - profile.cumulative(r0) - kPi * (r1 * r1 - r0 * r0) * cap(r);
+        const Rgbd ring = within[k + 1] - within[k] - kPi * (r1 * r1 - r0 * r0) * cap(r);
         split.near_share += ring;
         second_moment += ring.max(0.0).sum() * r * r;
         weight += ring.max(0.0).sum();
