@@ -192,6 +192,7 @@ TruthPhoto read_truth(const fs::path& folder, const std::string& name) {
     Relief& relief = truth.relief;
     relief.mask = truth.photo.mask;
     relief.inradius_px = inradius_px(relief.mask);
+    relief.is_measured = true;
     relief.depth_px = ImageF(z.width(), z.height());
     relief.normals = Image<Vec3f>(z.width(), z.height(), Vec3f(0, 0, 1));
     truth.height_px = ImageF(z.width(), z.height());
@@ -362,7 +363,7 @@ int main(int argc, char** argv) {
         const EnteringLight light = [&](const Relief& lit, const SurfacePoints& points,
                                         double eta) { return true_light(truth, lit, points, eta); };
         BssrdfOptions exact = options.bssrdf;
-        exact.is_level_known = true;
+        exact.is_level_known = exact.prefers_random_walk = true;
         const BodyEstimate known_body =
             estimate_body(true_relief, material.analysis.highlights.diffuse,
                           material.analysis.highlights.grown, light, exact);

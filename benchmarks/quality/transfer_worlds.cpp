@@ -230,7 +230,7 @@ Row run_world(int index, bool use_curved_body, bool with_ground, int refinement_
     exact.smoothing = 0.01;
     exact.samples_per_side = 8000;
     exact.longest = 1;
-    exact.is_level_known = true;
+    exact.is_level_known = exact.prefers_random_walk = true;
     const MediumEstimate known =
         estimate_bssrdf(shown, relief, lifted.analysis.highlights.grown, lights, exact);
     row.known = compare(known.profile(), truth);

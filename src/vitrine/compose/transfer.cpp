@@ -127,8 +127,11 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
         return entering_light(lit, points, analysis.explaining.lights, eta,
                               options.bssrdf.use_shadows);
     };
+    BssrdfOptions bssrdf = options.bssrdf;
+    // Balls are truly round; a silhouette inflated is not what it says.
+    bssrdf.prefers_random_walk |= analysis.relief.is_cluster();
     lifted.medium = estimate_bssrdf(shown, analysis.relief, analysis.highlights.grown, light,
-                                    options.bssrdf, progress.part(0.6, 0.8));
+                                    bssrdf, progress.part(0.6, 0.8));
     // R_d stays with the body for which the lights were found; another back would ask for others.
     if (options.use_back) {
         const std::optional<Relief> worn = refine_back(

@@ -145,6 +145,7 @@ MediumEstimate fit_medium(const ImageRgb& diffuse, const Relief& relief, const M
     fit_options.extent_px = extent;
     fit_options.shell_count = options.shell_count;
     fit_options.ridge = options.ridge;
+    fit_options.prefers_random_walk = options.prefers_random_walk;
     const ShellGrid shells = make_shells(samples.step_px, extent, options.shell_count);
 
     // How much more a curved body passes depends on the albedo that is being looked for.

@@ -53,6 +53,10 @@ struct BssrdfOptions {
     /// The light is given in the picture's units, so that albedos are what they are. Else only
     /// their ratios are known, and the brightest is taken for plausible at most (limit_albedo).
     bool is_level_known = false;
+    /// Shape and light are trusted: what does not fit is no reason for another profile than random
+    /// walks have (profile_fit.h; ordered channels only). With a wrong shape free exponentials are
+    /// nearer to the truth.
+    bool prefers_random_walk = false;
     Transmittance transmittance = Transmittance::Auto;
     std::uint64_t seed = 1;  ///< of the choice of pixels
 };

@@ -46,6 +46,9 @@ VectorXd huber_weights(const VectorXd& residual, const VectorXd& base) {
 /// A free profile that leaves less than this share of what an ordered one does refutes the order.
 constexpr double kRefuted = 0.7;
 
+/// The same for the shape of random walks.
+constexpr double kWalkRefuted = 0.35;
+
 struct PairFit {
     double a = 0, c = 0, cost = 1e300;
 };
@@ -208,23 +211,71 @@ TwoExponentials fit_exponentials_to_shells(const ShellGrid& shells, const Vector
     return best_pair(columns, value, area, lengths);
 }
 
+namespace {
+
+/// The factor of an image that best explains y, robust, and what it leaves unexplained.
+struct Level {
+    double factor = 0, cost = 0;
+};
+Level fit_level(const VectorXd& image, const VectorXd& y) {
+    const VectorXd plain = base_weights(y);
+    VectorXd weight = plain;
+    Level level;
+    for (int round = 0; round < 3; ++round) {
+        const VectorXd weighted = weight.cwiseProduct(image);
+        level.factor = std::max(0.0, weighted.dot(y) / std::max(weighted.dot(image), 1e-300));
+        weight = huber_weights(level.factor * image - y, plain);
+    }
+    level.cost = (level.factor * image - y).cwiseAbs2().dot(weight);
+    return level;
+}
+
+double misfit(const DistanceHistogram& histogram, const VectorXd& y, int field,
+              const TwoExponentials& fit) {
+    return (histogram.image_of(fit).col(field) - y).cwiseAbs2().dot(base_weights(y));
+}
+
+/// The profile of random walks whose width explains the picture best.
+TwoExponentials fit_random_walk(const DistanceHistogram& histogram, const VectorXd& exitance,
+                                int field, const ProfileFitOptions& options) {
+    TwoExponentials best;
+    double lowest = 1e300;
+    for (const double width :
+         length_grid(2 * options.shortest_px, 2 * options.longest_px, options.length_count)) {
+        const TwoExponentials unit = random_walk_profile(1, width);
+        const Level level = fit_level(histogram.image_of(unit).col(field), exitance);
+        if (level.cost >= lowest) continue;
+        lowest = level.cost;
+        best = random_walk_profile(level.factor, width);
+    }
+    return best;
+}
+
+TwoExponentials fit_one(const DistanceHistogram& histogram, const VectorXd& exitance, int field,
+                        const ProfileFitOptions& options) {
+    const TwoExponentials free = fit_exponentials(histogram, exitance, field, options);
+    if (!options.prefers_random_walk) return free;
+    const TwoExponentials walk = fit_random_walk(histogram, exitance, field, options);
+    const bool is_refuted = misfit(histogram, exitance, field, free) <
+                            kWalkRefuted * misfit(histogram, exitance, field, walk);
+    return is_refuted ? free : walk;
+}
+
+}  // namespace
+
 RgbExponentials fit_ordered(const DistanceHistogram& histogram, const MatrixXd& exitance,
                             const ProfileFitOptions& options) {
     int reference = 0;
     for (int c = 1; c < 3; ++c)
         if (exitance.col(c).mean() > exitance.col(reference).mean()) reference = c;
-    const TwoExponentials base =
-        fit_exponentials(histogram, exitance.col(reference), reference, options);
+    const TwoExponentials base = fit_one(histogram, exitance.col(reference), reference, options);
     RgbExponentials result;
     result[static_cast<std::size_t>(reference)] = base;
 
-    // Per other channel and width: the best albedo factor and what is left unexplained.
+    // Per other channel and width: the best level and what it leaves unexplained.
     constexpr int kWidths = 25;
     constexpr double kNarrowest = 0.25;
-    struct Trial {
-        double rho = 0, cost = 0;
-    };
-    std::array<std::array<Trial, kWidths>, 3> trials;
+    std::array<std::array<Level, kWidths>, 3> trials;
     std::array<double, kWidths> width{};
     for (int i = 0; i < kWidths; ++i) {
         width[static_cast<std::size_t>(i)] =
@@ -232,18 +283,9 @@ RgbExponentials fit_ordered(const DistanceHistogram& histogram, const MatrixXd& 
         const MatrixXd image = histogram.image_of(base.scaled(width[static_cast<std::size_t>(i)]));
         for (int c = 0; c < 3; ++c) {
             if (c == reference) continue;
-            const VectorXd u = image.col(c), y = exitance.col(c);
-            const VectorXd plain = base_weights(y);
-            VectorXd weight = plain;
-            Trial trial;
-            for (int round = 0; round < 3; ++round) {
-                const VectorXd weighted = weight.cwiseProduct(u);
-                trial.rho = std::max(0.0, weighted.dot(y) / std::max(weighted.dot(u), 1e-300));
-                weight = huber_weights(trial.rho * u - y, plain);
-            }
+            Level trial = fit_level(image.col(c), exitance.col(c));
             const double log_width = std::log(width[static_cast<std::size_t>(i)]);
-            trial.cost =
-                (trial.rho * u - y).cwiseAbs2().dot(weight) * (1 + 0.03 * log_width * log_width);
+            trial.cost *= 1 + 0.03 * log_width * log_width;
             trials[static_cast<std::size_t>(c)][static_cast<std::size_t>(i)] = trial;
         }
     }
@@ -254,7 +296,7 @@ RgbExponentials fit_ordered(const DistanceHistogram& histogram, const MatrixXd& 
     std::size_t best_one = kWidths - 1, best_two = kWidths - 1;
     for (std::size_t i = 0; i < kWidths; ++i) {
         for (std::size_t j = 0; j < kWidths; ++j) {
-            const bool is_ordered = (one[i].rho - two[j].rho) * (width[i] - width[j]) >= 0;
+            const bool is_ordered = (one[i].factor - two[j].factor) * (width[i] - width[j]) >= 0;
             if (is_ordered && one[i].cost + two[j].cost < lowest) {
                 lowest = one[i].cost + two[j].cost;
                 best_one = i;
@@ -264,16 +306,14 @@ RgbExponentials fit_ordered(const DistanceHistogram& histogram, const MatrixXd& 
     }
     const auto assign = [&](int c, std::size_t i) {
         TwoExponentials fit = base.scaled(width[i]);
-        const double rho = trials[static_cast<std::size_t>(c)][i].rho;
-        fit.a *= rho;
-        fit.c *= rho;
-        const VectorXd y = exitance.col(c), weight = base_weights(y);
-        const auto misfit = [&](const TwoExponentials& trial) {
-            return (histogram.image_of(trial).col(c) - y).cwiseAbs2().dot(weight);
-        };
-        const TwoExponentials free = fit_exponentials(histogram, y, c, options);
-        const bool is_refuted = misfit(free) < kRefuted * misfit(fit);
-        result[static_cast<std::size_t>(c)] = is_refuted ? free : fit;
+        const double factor = trials[static_cast<std::size_t>(c)][i].factor;
+        fit.a *= factor;
+        fit.c *= factor;
+        const VectorXd y = exitance.col(c);
+        const TwoExponentials own = fit_one(histogram, y, c, options);
+        const bool is_refuted =
+            misfit(histogram, y, c, own) < kRefuted * misfit(histogram, y, c, fit);
+        result[static_cast<std::size_t>(c)] = is_refuted ? own : fit;
     };
     assign(first, best_one);
     assign(second, best_two);

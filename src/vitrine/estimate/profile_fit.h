@@ -15,6 +15,10 @@ struct ProfileFitOptions {
     int shell_count = 24;
     double ridge = 1e-4;
     int length_count = 40;  ///< grid of lengths, geometric
+    /// Two free exponentials take up errors: a narrow one edges that are too sharp, a wide one
+    /// light that the list lacks. Where shape and light are trusted, the profile of random walks
+    /// (optics/radial_profile) stands unless free ones leave less than 0.35 of its misfit.
+    bool prefers_random_walk = false;
 };
 
 /// Edges of the steps: 0, 1.5 cells, then geometric.

@@ -69,6 +69,20 @@ TEST(TwoExponentials, RescalingKeepsTheAlbedo) {
     EXPECT_NEAR(fit.scaled(2.5).mean_radius(), 2.5 * fit.mean_radius(), 1e-12);
 }
 
+TEST(TwoExponentials, RandomWalksBeyondWhatPicturesResolve) {
+    constexpr double kMean = 4, kAlbedo = 0.7, kFrom = 0.15 * kMean;
+    const TwoExponentials fit = random_walk_profile(kAlbedo, kMean);
+    EXPECT_NEAR(fit.total(), kAlbedo, 1e-12);
+    // Christensen and Burley 2015: the share beyond r.
+    const auto beyond = [&](double r) {
+        return 0.25 * std::exp(-r / (kMean / 2.5)) + 0.75 * std::exp(-r / (3 * kMean / 2.5));
+    };
+    for (double r = kFrom; r < 20 * kMean; r *= 1.05) {
+        const double ours = (kAlbedo - fit.cumulative(r)) / (kAlbedo - fit.cumulative(kFrom));
+        EXPECT_NEAR(ours, beyond(r) / beyond(kFrom), 0.01) << r;
+    }
+}
+
 TEST(RadialProfile, TableFollowsTheFit) {
     const TwoExponentials fit{0.3, -2.0, 0.05, -0.4};
     const RadialProfile table = tabulate({fit, fit, fit}, 0.01, 40);

@@ -43,6 +43,14 @@ TwoExponentials TwoExponentials::scaled(double factor) const {
     return {a / area, b / factor, c / area, d / factor};
 }
 
+TwoExponentials random_walk_profile(double albedo, double mean_radius) {
+    // Minimax over the cumulative albedo; lengths in mean radii of the exact profile.
+    constexpr double kNearShare = 0.433, kNear = 0.200, kFar = 0.795;
+    const double near = kNear * mean_radius, far = kFar * mean_radius;
+    return {kNearShare * albedo / (2 * kPi * near * near), -1 / near,
+            (1 - kNearShare) * albedo / (2 * kPi * far * far), -1 / far};
+}
+
 Rgbd RadialProfile::at(double radius) const {
     VITRINE_CHECK_EQ(r.size(), rd.size());
     if (r.empty() || radius > r.back()) return Rgbd::Zero();

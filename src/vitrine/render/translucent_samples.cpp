@@ -4,6 +4,9 @@
 #include "image/filter.h"
 #include "image/pixel_box.h"
 
+#include <array>
+#include <map>
+
 namespace vitrine {
 
 double entering_irradiance(const Vec3f& normal, const Vec3& direction, double eta) {
@@ -35,6 +38,80 @@ ReliefSamples sample_balls(const Relief& relief, int count) {
     }
     samples.front_count = samples.position.size();
     return samples;
+}
+
+/// A jump is one that the normals on both sides do not explain: more than this many times the
+/// steeper slope, and than this many pixels.
+constexpr double kJumpSlopes = 2, kJumpPx = 2;
+/// Slopes of steeper normals are not known better than to a pixel.
+constexpr float kMinSlopeCos = 0.05f;
+
+/// Collects walls per lattice cell, layer of a step and direction.
+class WallSums {
+  public:
+    explicit WallSums(const ReliefSamples& samples) : samples_(samples) {}
+
+    /// The wall between pixel (x, y) and the next one along an axis, from height `top` down.
+    void add(int x, int y, bool is_column, bool faces_next, double top, double height) {
+        const int layers = std::max(1, static_cast<int>(std::ceil(height / samples_.step_px)));
+        const double sign = faces_next ? 1 : -1;
+        const Vec3 normal = is_column ? Vec3(0, -sign, 0) : Vec3(sign, 0, 0);
+        for (int k = 0; k < layers; ++k) {
+            const Vec3 middle(x + (is_column ? 0 : 0.5), -(y + (is_column ? 0.5 : 0)),
+                              top - height * (k + 0.5) / layers);
+            Sum& sum = sums_[{static_cast<int>((x - samples_.origin_x) / samples_.step_px),
+                              static_cast<int>((y - samples_.origin_y) / samples_.step_px),
+                              static_cast<int>(std::floor(middle.z() / samples_.step_px)),
+                              2 * (is_column ? 1 : 0) + (faces_next ? 1 : 0)}];
+            const double area = height / layers;
+            sum.position += area * middle;
+            sum.normal = normal;
+            sum.area += area;
+        }
+    }
+
+    void append_to(ReliefSamples& samples) const {
+        for (const auto& [place, sum] : sums_) {
+            samples.position.push_back((sum.position / sum.area).cast<float>());
+            samples.normal.push_back(sum.normal.cast<float>());
+            samples.area_px2.push_back(static_cast<float>(sum.area));
+        }
+    }
+
+  private:
+    struct Sum {
+        Vec3 position = Vec3::Zero(), normal = Vec3::Zero();
+        double area = 0;
+    };
+    const ReliefSamples& samples_;
+    std::map<std::array<int, 4>, Sum> sums_;
+};
+
+/// What closes the surface where the height jumps: a nearer part hides its own side from the
+/// camera, not from the lamps.
+void add_walls(const Relief& relief, ReliefSamples& samples) {
+    const auto slope = [&](int x, int y, bool is_column) {
+        const Vec3f& n = relief.normals(x, y);
+        return (is_column ? n.y() : -n.x()) / std::max(n.z(), kMinSlopeCos);
+    };
+    WallSums walls(samples);
+    for (const bool is_column : {false, true}) {
+        for (int y = 0; y < relief.mask.height(); ++y) {
+            for (int x = 0; x < relief.mask.width(); ++x) {
+                const int u = is_column ? x : x + 1, v = is_column ? y + 1 : y;
+                if (!relief.mask.contains(u, v)) continue;
+                if (!is_inside(relief.mask, x, y) || !is_inside(relief.mask, u, v)) continue;
+                const double here = relief.depth_px(x, y), next = relief.depth_px(u, v);
+                const double jump = std::abs(next - here);
+                const double a = slope(x, y, is_column), b = slope(u, v, is_column);
+                if (jump <= std::max(kJumpPx, kJumpSlopes * std::max(std::abs(a), std::abs(b))))
+                    continue;
+                walls.add(x, y, is_column, here > next, std::max(here, next),
+                          jump - 0.5 * std::abs(a + b));
+            }
+        }
+    }
+    walls.append_to(samples);
 }
 
 }  // namespace
@@ -97,6 +174,7 @@ ReliefSamples sample_relief(const Relief& relief, int per_side) {
         samples.normal.push_back(back_normal[k]);
         samples.area_px2.push_back(samples.area_px2[k]);
     }
+    if (relief.is_measured) add_walls(relief, samples);
     return samples;
 }
 

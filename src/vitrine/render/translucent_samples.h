@@ -11,7 +11,10 @@ namespace vitrine {
 
 /// Cells of a square lattice over the mask, front and mirrored back. Viewer frame, pixels.
 struct ReliefSamples {
-    std::vector<Vec3f> position;     ///< front samples first, then back ones in the same order
+    /// Front samples first, then back ones in the same order, then walls where a measured
+    /// height jumps from one pixel to the next. Light given per pixel (ReliefIrradiance) does not
+    /// reach walls.
+    std::vector<Vec3f> position;
     std::vector<Vec3f> normal;       ///< unit
     std::vector<float> area_px2;     ///< of the curved surface in the cell
     std::vector<std::int16_t> ball;  ///< of a cluster: which ball; empty for one body

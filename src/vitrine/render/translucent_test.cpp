@@ -64,6 +64,40 @@ TEST(Translucent, CoarseLatticeAgreesWithBruteForce) {
     }
 }
 
+TEST(Translucent, MeasuredJumpsAreClosedByWalls) {
+    // A block with two steps: flat heights 50 | 20 | 30, so walls of 30 and 10 pixels.
+    constexpr int kSize = 90, kTall = 60;
+    Relief block;
+    block.mask = Mask(kSize, kSize);
+    block.depth_px = ImageF(kSize, kSize);
+    block.normals = Image<Vec3f>(kSize, kSize, Vec3f(0, 0, 1));
+    block.inradius_px = 30;
+    for (int y = 0; y < kTall; ++y) {
+        for (int x = 0; x < kSize; ++x) {
+            block.mask(x, y) = 255;
+            block.depth_px(x, y) = x < 30 ? 50.0f : x < 60 ? 20.0f : 30.0f;
+        }
+    }
+    const std::size_t unmeasured = sample_relief(block, 300).position.size();
+    block.is_measured = true;
+    const ReliefSamples samples = sample_relief(block, 300);
+    ASSERT_EQ(unmeasured, 2 * samples.front_count);
+    double right = 0, left = 0;
+    for (std::size_t i = unmeasured; i < samples.position.size(); ++i) {
+        const bool is_first = samples.position[i].x() < 45;
+        EXPECT_EQ(samples.normal[i], Vec3f(is_first ? 1 : -1, 0, 0));
+        EXPECT_GT(samples.position[i].z(), 20);
+        (is_first ? right : left) += samples.area_px2[i];
+    }
+    EXPECT_NEAR(right, 30 * kTall, 1);
+    EXPECT_NEAR(left, 10 * kTall, 1);
+    // Steep is not a jump.
+    Relief round = ball(200, 80);
+    round.is_measured = true;
+    const ReliefSamples smooth = sample_relief(round, 500);
+    EXPECT_EQ(smooth.position.size(), 2 * smooth.front_count);
+}
+
 TEST(Translucent, NarrowKernelIsLambertian) {
     const Relief relief = ball(160, 70);
     ViewLights lights;

@@ -30,6 +30,9 @@ struct Relief {
     Image<Vec3f> normals;       ///< unit, viewer frame; (0, 0, 1) outside
     Image<Vec3f> base_normals;  ///< of the smooth base without shading detail; empty: use `normals`
     double inradius_px = 0;     ///< of the mask: the unit of every length parameter
+    /// Heights are known, not guessed from silhouette and shading: where they jump, a nearer part
+    /// hides its own side.
+    bool is_measured = false;
 
     /// A cluster: light travels inside each ball, not from one to the next. Empty: one body, its
     /// back the mirror of its front.
