@@ -186,6 +186,31 @@ TEST(Caustics, SameBitsForAnyThreadCount) {
     }
 }
 
+// The list itself, of glass, paint and a glossy table; more photons than a block has.
+TEST(Caustics, SamePhotonsForAnyThreadCount) {
+    Scene scene = ball_on_table(0.05);
+    add(scene, make_plane(0.3, 0.001),
+        Ward{Rgb::Constant(0.3f), Rgb::Constant(0.3f), 0.1, 0.1, WardForm::Duer});
+    const RenderScene prepared(scene);
+    CausticOptions options;
+    options.photon_count = 30000;
+    std::vector<CausticPhotons> results;
+    for (const int threads : {1, 2, 8}) {
+        set_thread_count(threads);
+        results.push_back(trace_caustics(prepared, options));
+    }
+    set_thread_count(0);
+    const std::vector<Photon>& first = results[0].photons;
+    const auto is_glossy = [](const Photon& photon) { return photon.is_glossy; };
+    EXPECT_GT(std::count_if(first.begin(), first.end(), is_glossy), 100);
+    for (const CausticPhotons& result : results) {
+        ASSERT_EQ(result.photons.size(), first.size());
+        EXPECT_EQ(std::memcmp(result.photons.data(), first.data(), first.size() * sizeof(Photon)),
+                  0);
+        EXPECT_EQ(result.balance.stored, results[0].balance.stored);
+    }
+}
+
 // Photons against paths that find a large lamp by themselves: each pixel's difference in standard
 // errors, at a level corrected for their number; and the mean.
 void expect_photons_agree_with_paths(const Scene& scene) {

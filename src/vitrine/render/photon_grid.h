@@ -36,6 +36,7 @@ struct Photon {
     std::uint8_t views : 2 = 3;  ///< scenes in which it arrives: kRealParts | kVirtualParts bits
     bool is_glossy : 1 = false;  ///< bent by a glossy lobe somewhere: its pattern is soft
     bool keeps_direction : 1 = false;  ///< the receiver is not Lambertian
+    std::uint8_t spare : 4 = 0;        ///< so that equal photons are equal byte by byte
 
     Rgb diffuse_albedo() const { return Rgb(albedo[0], albedo[1], albedo[2]) / 255.0f; }
     void set_diffuse_albedo(const Rgb& value) {
