@@ -48,14 +48,4 @@ BentRays bend(const ShadingPoint& point, const Vec3f& direction, float eta) {
     return rays;
 }
 
-InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
-                               const Vec3f& direction, const Media& media) {
-    const Boundary boundary = cross_boundary(scene, point.part, point.is_front, media);
-    if (boundary.eta == 1.0f) {
-        return {false, 0.0f, Vec3f::Zero(), direction, 1.0f, boundary.beyond};
-    }
-    const BentRays rays = bend(point, direction, boundary.eta);
-    return {true, rays.reflectance, rays.reflected, rays.refracted, boundary.eta, boundary.beyond};
-}
-
 }  // namespace vitrine

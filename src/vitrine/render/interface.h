@@ -6,15 +6,6 @@
 
 namespace vitrine {
 
-struct InterfaceEvent {
-    bool is_optical = true;    ///< false: hidden inside another medium, the ray goes straight on
-    float reflectance = 0.0f;  ///< unpolarised Fresnel
-    Vec3f reflected = Vec3f::Zero();
-    Vec3f refracted = Vec3f::Zero();  ///< meaningless when reflectance is 1
-    float eta = 1.0f;                 ///< index beyond / index before
-    Media beyond;                     ///< media after crossing
-};
-
 /// What lies beyond a dielectric part's surface.
 struct Boundary {
     Media beyond;      ///< media after crossing
@@ -23,18 +14,14 @@ struct Boundary {
 /// @param is_front from outside the part; @param media on this side
 Boundary cross_boundary(const RenderScene& scene, int part, bool is_front, const Media& media);
 
-/// The two rays at an optical boundary; members as of `InterfaceEvent`.
+/// The two rays at an optical boundary.
 struct BentRays {
-    float reflectance = 0.0f;
+    float reflectance = 0.0f;  ///< unpolarised Fresnel
     Vec3f reflected = Vec3f::Zero();
-    Vec3f refracted = Vec3f::Zero();
+    Vec3f refracted = Vec3f::Zero();  ///< meaningless when reflectance is 1
 };
 /// @param direction unit, of travel; @param eta index beyond / index before, not 1
 BentRays bend(const ShadingPoint& point, const Vec3f& direction, float eta);
-
-/// Both: @param direction unit, of travel; @param media on this side
-InterfaceEvent cross_interface(const RenderScene& scene, const ShadingPoint& point,
-                               const Vec3f& direction, const Media& media);
 
 /// Mirror direction about the shading normal, kept above the geometric surface.
 Vec3f mirror_direction(const ShadingPoint& point, const Vec3f& direction);

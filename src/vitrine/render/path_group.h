@@ -20,6 +20,7 @@ class PathGroup {
           origin_(origin),
           y_(y),
           lists_(tracers.size()),
+          workspace_(tracers.front()),
           use_(std::move(use)) {}
 
     /// @param x of the path's pixel; @param sampler of stream_key(seed, x, y) and the sample's
@@ -27,29 +28,28 @@ class PathGroup {
     void add(std::size_t tracer, int x, const PathSampler& sampler, const PathWish& wish) {
         List& list = lists_[tracer];
         if (lists_.size() > 1) turns_.push_back(tracer);
-        list.columns.push_back(x);
-        list.tasks.push_back({{sampler, Vec3f::Zero()}, wish});
+        list.columns[list.count] = x;
+        PathTask& task = list.tasks[list.count++];
+        task.sample.sampler = sampler;
+        task.wish = wish;
         if (++count_ >= kTogether) finish();
     }
     /// Follows those that wait.
     void finish() {
         for (std::size_t t = 0; t < lists_.size(); ++t) {
             List& list = lists_[t];
-            rays_.aim(list.columns, y_, list.tasks);
-            if (list.pairs.size() < list.tasks.size()) list.pairs.resize(list.tasks.size());
-            tracers_[t].trace_both(origin_, list.tasks,
-                                   std::span(list.pairs).first(list.tasks.size()), workspace_);
-            list.next = 0;
+            const std::span tasks = std::span(list.tasks).first(list.count);
+            rays_.aim(list.columns, y_, tasks);
+            tracers_[t].trace_both(origin_, tasks, std::span(list.pairs).first(list.count),
+                                   workspace_);
+            list.count = 0;
         }
         for (std::size_t i = 0; i < count_; ++i) {
             List& list = lists_[lists_.size() > 1 ? turns_[i] : 0];
-            const std::size_t k = list.next++;
+            const std::size_t k = list.count++;
             use_(list.columns[k], list.tasks[k].wish, list.pairs[k]);
         }
-        for (List& list : lists_) {
-            list.tasks.clear();
-            list.columns.clear();
-        }
+        for (List& list : lists_) list.count = 0;
         turns_.clear();
         count_ = 0;
     }
@@ -57,10 +57,10 @@ class PathGroup {
   private:
     static constexpr std::size_t kTogether = 128;
     struct List {
-        std::vector<int> columns;
-        std::vector<PathTask> tasks;
-        std::vector<PathPair> pairs;
-        std::size_t next = 0;  // to be given away
+        std::vector<int> columns = std::vector<int>(kTogether);
+        std::vector<PathTask> tasks = std::vector<PathTask>(kTogether);
+        std::vector<PathPair> pairs = std::vector<PathPair>(kTogether);
+        std::size_t count = 0;  // that wait, then that are given away
     };
     std::span<const PathTracer> tracers_;
     const CameraRays& rays_;

@@ -88,7 +88,7 @@ TEST(PathPair, TogetherAsOneByOne) {
                          {k % 5 > 0, 1 + k % 3}});
     }
     std::vector<PathPair> together(tasks.size());
-    PathTracer::Workspace workspace;
+    PathTracer::Workspace workspace(tracer);
     tracer.trace_both(eye, tasks, together, workspace);
     for (std::size_t i = 0; i < tasks.size(); ++i) {
         const PathPair alone = tracer.trace_both(eye, tasks[i]);

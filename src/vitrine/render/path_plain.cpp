@@ -5,11 +5,6 @@
 namespace vitrine {
 namespace {
 
-template <typename T>
-std::size_t lane(T i) {
-    return static_cast<std::size_t>(i);
-}
-
 /// As the other `sample_light`, of lights of any kind.
 void sample_light(PlainLanes& lanes, const LightSampler& lights, std::size_t light, int count) {
     for (int i = 0; i < count; ++i) {
@@ -33,10 +28,7 @@ std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
 }
 
 void PathTracer::shade_plain(Wave& wave) const {
-    const std::span<const Meeting> all(wave.plain);
-    for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
-        shade_plain(wave, all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
-    }
+    for_each_batch(wave.plain, [&](std::span<const Meeting> hits) { shade_plain(wave, hits); });
     wave.plain.clear();
 }
 
@@ -51,10 +43,7 @@ void PathTracer::shade_plain(Wave& wave, std::span<const Meeting> hits) const {
         lanes.albedo.set(
             i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(ray.part, hit_of(ray)));
         lanes.throughput.set(i, state.throughput);
-        const PathSampler& sampler = wave.task(state).sample.sampler;
-        lanes.random.stream[lane(i)] = sampler.mixed_stream();
-        lanes.random.index[lane(i)] = sampler.index();
-        lanes.random.depth[lane(i)] = static_cast<std::uint32_t>(state.depth);
+        wave.set_random(i, state);
         lanes.can_scatter[lane(i)] =
             !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces ? 1
                                                                                                 : 0;
@@ -80,7 +69,8 @@ void PathTracer::shade_plain(Wave& wave, std::span<const Meeting> hits) const {
             add_caustics(state, point, hits[lane(i)].ray->ray.origin, bsdf,
                          Frame(point.shading_normal), Vec3f(0, 0, 1), wave.sink(state));
         }
-        if (is_open[lane(i)] && !state.has_receiver && !state.is_layer_fixed) {
+        if (options_.keeps_soft_apart && is_open[lane(i)] && !state.has_receiver &&
+            !state.is_layer_fixed) {
             wave.sink(state).each(state.views, [&](PathResult& result) {
                 result.soft.is_present = true;
                 result.soft.albedo = bsdf.albedo;

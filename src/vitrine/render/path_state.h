@@ -2,6 +2,8 @@
 // `PathTracer` alone.
 #pragma once
 
+#include "render/glass_lanes.h"
+#include "render/medium_table.h"
 #include "render/path_tracer.h"
 #include "render/plain_lanes.h"
 
@@ -22,13 +24,27 @@ inline std::uint32_t light_use(std::size_t light) {
     return kLightUse + static_cast<std::uint32_t>(std::min<std::size_t>(light, 8));
 }
 
+template <typename T>
+std::size_t lane(T i) {
+    return static_cast<std::size_t>(i);
+}
+
+/// Calls `body(items)` for as many at a time as there are lanes.
+template <typename Item, typename Body>
+void for_each_batch(const std::vector<Item>& items, const Body& body) {
+    const std::span<const Item> all(items);
+    for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
+        body(all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
+    }
+}
+
 /// What a path knows of itself beside the ray it is on.
 struct PathTracer::State {
     Rgb throughput = Rgb::Ones();
-    float pdf = 0;           // of the ray's direction at the receiver it left; 0: a single one
-    std::uint32_t path = 0;  // whose task and result
-    Media media;
-    std::int16_t depth = 0;  // vertices so far
+    float pdf = 0;             // of the ray's direction at the receiver it left; 0: a single one
+    std::uint32_t path = 0;    // whose task and result
+    std::uint32_t medium = 0;  // number in the wave's table
+    std::int16_t depth = 0;    // vertices so far
     std::int16_t diffuse_bounces = 0;
     std::int16_t specular_bounces = 0;
     std::uint8_t views = kVirtualParts;  // scenes whose path this is
@@ -106,12 +122,14 @@ struct PathTracer::Meeting {
 /// Paths that go on side by side, one surface at a time: rays are sent one after the other, with
 /// nothing in between that drives Embree's data out of the nearest caches.
 struct PathTracer::Wave {
-    Wave() = default;
-    Wave(std::span<const PathTask> its_tasks, std::span<PathPair> its_results)
-        : tasks(its_tasks), results(its_results) {}
+    explicit Wave(const RenderScene& scene) : media(scene) {}
+    Wave(const RenderScene& scene, std::span<const PathTask> its_tasks,
+         std::span<PathPair> its_results)
+        : tasks(its_tasks), results(its_results), media(scene) {}
 
     std::span<const PathTask> tasks;
     std::span<PathPair> results;
+    MediumTable media;
     std::vector<RayAndHit> rays;  // under way, then answered
     std::vector<State> states;    // of `rays`
     std::vector<RayAndHit> next_rays;
@@ -119,14 +137,18 @@ struct PathTracer::Wave {
     // Met in the scene without virtual parts alone, by paths that were those of both.
     std::vector<State> parted;
     std::vector<RayAndHit> parted_rays;
-    std::vector<Meeting> plain;  // surfaces, of the states above, in the order in which they came
+    // Surfaces that wait, met by the states above, in the order in which they came.
+    std::vector<Meeting> plain, glass;
     PlainLanes lanes = {};
+    GlassLanes bent = {};
     std::vector<BareRay> shadow_rays;
     std::vector<ShadowRay> shadows;  // of `shadow_rays`
     std::vector<int> shadow_lanes;   // of the last shadow rays
 
     const PathTask& task(const State& state) const { return tasks[state.path]; }
     Sink sink(const State& state) const { return {results[state.path]}; }
+    /// The path's random numbers at its vertex, into a lane.
+    void set_random(int i, const State& state);
     /// Surfaces met point into what was parted: room for all of them.
     void reserve_parted(std::size_t count);
     /// The next rays become those under way.
@@ -167,6 +189,13 @@ inline void PathTracer::State::pass_specular(Layer seen_by, bool has_photons) {
     if (is_layer_fixed || has_receiver) return;
     layer = seen_by;
     is_layer_fixed = true;
+}
+
+inline void PathTracer::Wave::set_random(int i, const State& state) {
+    const PathSampler& sampler = task(state).sample.sampler;
+    lanes.random.stream[lane(i)] = sampler.mixed_stream();
+    lanes.random.index[lane(i)] = sampler.index();
+    lanes.random.depth[lane(i)] = static_cast<std::uint32_t>(state.depth);
 }
 
 inline void PathTracer::Wave::reserve_parted(std::size_t count) {

@@ -4,12 +4,6 @@
 #include "render/path_state.h"
 
 namespace vitrine {
-namespace {
-
-/// A branch of a split ray fainter than this is left to chance.
-constexpr float kMinSplitShare = 0.01f;
-
-}  // namespace
 
 PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
                        const TranslucentLight* translucent)
@@ -25,19 +19,20 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
 
 PathResult PathTracer::trace(const Vec3f& origin, const PathTask& task) const {
     PathPair pair;
-    Wave wave(std::span(&task, 1), std::span(&pair, 1));
+    Wave wave(scene_, std::span(&task, 1), std::span(&pair, 1));
     start(origin, kVirtualParts, wave);
     return pair.with_;
 }
 
 PathPair PathTracer::trace_both(const Vec3f& origin, const PathTask& task) const {
     PathPair pair;
-    Workspace workspace;
+    Workspace workspace(*this);
     trace_both(origin, std::span(&task, 1), std::span(&pair, 1), workspace);
     return pair;
 }
 
-PathTracer::Workspace::Workspace() : wave_(std::make_unique<Wave>()) {}
+PathTracer::Workspace::Workspace(const PathTracer& tracer)
+    : wave_(std::make_unique<Wave>(tracer.scene_)) {}
 PathTracer::Workspace::~Workspace() = default;
 
 void PathTracer::trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
@@ -50,21 +45,23 @@ void PathTracer::trace_both(const Vec3f& origin, std::span<const PathTask> tasks
 
 void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) const {
     const std::size_t count = wave.tasks.size();
-    wave.rays.resize(count);
+    wave.rays.reserve(count);
     for (std::size_t i = 0; i < count; ++i) {
         wave.results[i].clear();
-        wave.rays[i] = RayAndHit(origin, wave.tasks[i].sample.direction, mask_of(views));
+        wave.rays.emplace_back(origin, wave.tasks[i].sample.direction, mask_of(views));
     }
     // Neighbours' camera rays run side by side, which Embree's packets are made for.
     scene_.closest(wave.rays, true);
     State first;
     first.views = static_cast<std::uint8_t>(views);
+    prefetch(wave);
     wave.states.reserve(count);  // surfaces met point into it
     wave.reserve_parted(has_virtual_ ? count : 0);
     for (std::size_t i = 0; i < count; ++i) {
         if (!wave.rays[i].is_hit() && !has_lamps_ && !has_background_) continue;
-        first.path = static_cast<std::uint32_t>(i);
-        meet(wave.states.emplace_back(first), wave.rays[i], wave);
+        State& state = wave.states.emplace_back(first);
+        state.path = static_cast<std::uint32_t>(i);
+        meet(state, wave.rays[i], wave);
     }
     finish(wave);
 }
@@ -72,16 +69,21 @@ void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) con
 void PathTracer::finish(Wave& wave) const {
     for (;;) {
         shade_plain(wave);
+        pass_glass(wave);
         add_shadows(wave);
         wave.go_on();
         const std::size_t count = wave.states.size();
         if (count == 0) return;
         scene_.closest(wave.rays, false);
-        for (const RayAndHit& ray : wave.rays) scene_.prefetch_triangle(ray);
-        for (const RayAndHit& ray : wave.rays) scene_.prefetch_vertices(ray);
+        prefetch(wave);
         wave.reserve_parted(has_virtual_ ? count : 0);
         for (std::size_t i = 0; i < count; ++i) meet(wave.states[i], wave.rays[i], wave);
     }
+}
+
+void PathTracer::prefetch(const Wave& wave) const {
+    for (const RayAndHit& ray : wave.rays) scene_.prefetch_triangle(ray);
+    for (const RayAndHit& ray : wave.rays) scene_.prefetch_vertices(ray);
 }
 
 void PathTracer::meet(State& state, const RayAndHit& ray, Wave& wave) const {
@@ -102,7 +104,7 @@ void PathTracer::meet(State& state, const RayAndHit& ray, Wave& wave) const {
 
 void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const PathTask> tasks,
                           std::uint32_t views, std::span<PathPair> results) const {
-    Wave wave(tasks, results);
+    Wave wave(scene_, tasks, results);
     const bool is_in_one = views == kVirtualParts || views == kRealParts;
     const Bsdf bsdf = EnteringBsdf{eta};
     const Frame frame(point.shading_normal);
@@ -125,8 +127,8 @@ void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const 
 
 void PathTracer::step(State& state, const RayAndHit& ray, Wave& wave) const {
     Sink sink = wave.sink(state);
-    if (state.media.current() != Media::kNone) {
-        state.throughput *= scene_.transmittance(state.media, ray.distance());
+    if (wave.media.absorbs(state.medium)) {
+        state.throughput *= scene_.transmittance(wave.media.media(state.medium), ray.distance());
     }
     if (has_lamps_) add_emission(state, ray, sink);
     if (!ray.is_hit()) {
@@ -146,13 +148,14 @@ void PathTracer::step(State& state, const RayAndHit& ray, Wave& wave) const {
         wave.plain.push_back({&state, &ray});
         return;
     }
-    const Hit hit = hit_of(ray);
-    const ShadingPoint point = scene_.surface(hit, ray.ray.direction);
-    if (scene_.dielectric(hit.part)) {
-        if (++state.specular_bounces > options_.max_specular_bounces) return;
-        pass_interface(state, point, ray, wave);
+    if (scene_.dielectric(ray.part)) {
+        if (++state.specular_bounces <= options_.max_specular_bounces) {
+            wave.glass.push_back({&state, &ray});
+        }
         return;
     }
+    const Hit hit = hit_of(ray);
+    const ShadingPoint point = scene_.surface(hit, ray.ray.direction);
     const Bsdf bsdf = scene_.bsdf(point, hit);
     if (is_smooth(bsdf)) {
         if (++state.specular_bounces > options_.max_specular_bounces) return;
@@ -201,43 +204,6 @@ void PathTracer::pass_mirror(const State& state, const ShadingPoint& point, cons
     State& next = wave.add(state, scene_.leave(point, direction), direction);
     next.throughput *= reflectance;
     next.pass_specular(Layer::Reflection, caustics_ != nullptr);
-}
-
-void PathTracer::pass_interface(const State& state, const ShadingPoint& point, const RayAndHit& ray,
-                                Wave& wave) const {
-    const InterfaceEvent event = cross_interface(scene_, point, ray.ray.direction, state.media);
-    if (!event.is_optical) {
-        wave.add(state, scene_.leave(point, event.refracted), event.refracted).media = event.beyond;
-        return;
-    }
-    const auto reflect = [&](float share) {
-        State& next = wave.add(state, scene_.leave(point, event.reflected), event.reflected);
-        next.throughput *= share;
-        next.pass_specular(Layer::Reflection, caustics_ != nullptr);
-    };
-    // Radiance is compressed into a smaller solid angle in the denser medium (Veach 1997, 5.2).
-    const float compression = 1.0f / (event.eta * event.eta);
-    const auto refract = [&](float share) {
-        State& next = wave.add(state, scene_.leave(point, event.refracted), event.refracted);
-        next.throughput *= share * compression;
-        next.media = event.beyond;
-        next.pass_specular(Layer::Refraction, caustics_ != nullptr);
-    };
-    const float f = event.reflectance;
-    if (f >= 1) {
-        reflect(1);
-        return;
-    }
-    const float faint_share = std::min(f, 1 - f) * state.throughput.maxCoeff();
-    if (!state.has_receiver && state.specular_bounces <= options_.split_depth &&
-        faint_share > kMinSplitShare) {
-        refract(1 - f);
-        reflect(f);
-    } else if (wave.task(state).sample.sampler.number(state.depth, kBranchUse) < f) {
-        reflect(1);
-    } else {
-        refract(1);
-    }
 }
 
 }  // namespace vitrine

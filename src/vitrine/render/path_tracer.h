@@ -32,6 +32,7 @@ struct PathOptions {
     int max_specular_bounces = 24;
     int split_depth = 4;  ///< interfaces at which both branches are followed from the camera
     bool direct_light_only = false;  ///< leave out what other surfaces scatter and the environment
+    bool keeps_soft_apart = true;  ///< false: soft light is a part of the layers, for a little less
 };
 
 /// What other surfaces and the environment send to a plain diffuse surface that is seen without
@@ -85,7 +86,7 @@ class PathPair {
 /// A ray from the camera and the path's random numbers.
 struct CameraSample {
     PathSampler sampler;
-    Vec3f direction;
+    Vec3f direction = Vec3f::Zero();
 };
 
 /// What one path is asked for.
@@ -139,14 +140,20 @@ class PathTracer {
     void start(const Vec3f& origin, std::uint32_t views, Wave& wave) const;
     /// Follows all paths of the wave to their ends.
     void finish(Wave& wave) const;
+    /// Asks memory for the surfaces that the wave's rays have met.
+    void prefetch(const Wave& wave) const;
     /// What the path's ray has met, in one scene or in both.
     void meet(State& state, const RayAndHit& ray, Wave& wave) const;
-    /// What that brings; what goes on from there is added to the wave's next. Plain surfaces wait.
+    /// What that brings; what goes on from there is added to the wave's next. Plain surfaces
+    /// and glass wait.
     void step(State& state, const RayAndHit& ray, Wave& wave) const;
     void pass_mirror(const State& state, const ShadingPoint& point, const RayAndHit& ray,
                      const Rgb& reflectance, Wave& wave) const;
-    void pass_interface(const State& state, const ShadingPoint& point, const RayAndHit& ray,
-                        Wave& wave) const;
+    /// Where paths go on from the glass that the wave has met.
+    void pass_glass(Wave& wave) const;
+    void pass_glass(Wave& wave, std::span<const Meeting> hits) const;
+    /// @param i lane of the surface; @param beyond medium there
+    void branch(const State& state, int i, std::uint32_t beyond, Wave& wave) const;
     /// What the plain diffuse surfaces bring that the wave has met, many side by side.
     void shade_plain(Wave& wave) const;
     void shade_plain(Wave& wave, std::span<const Meeting> hits) const;
@@ -185,7 +192,8 @@ class PathTracer {
 
 class PathTracer::Workspace {
   public:
-    Workspace();
+    /// For this tracer and others of the same scene.
+    explicit Workspace(const PathTracer& tracer);
     ~Workspace();
 
   private:

@@ -67,9 +67,13 @@ constexpr int kMinPassSamples = 4;
 struct PixelSum {
     Rgbd sum = Rgbd::Zero();
     double square = 0;  // of the luminance
-    int count = 0, soft_count = 0;
-    SoftSums soft;
+    int count = 0;
 
+    void add(const Rgb& value) {
+        sum += value.cast<double>();
+        square += static_cast<double>(luminance(value)) * luminance(value);
+        ++count;
+    }
     Rgbd mean() const { return sum / count; }
     /// Of the mean's luminance.
     double variance() const {
@@ -77,6 +81,23 @@ struct PixelSum {
         const double l = luminance(mean());
         return std::max(0.0, square / count - l * l) / (count - 1);
     }
+};
+
+/// Soft light of one pixel.
+struct SoftSum {
+    SoftSums sums;
+    int count = 0;  // samples that were asked for it
+};
+
+/// Sums over the samples of a picture.
+struct PictureSums {
+    PictureSums(const Camera& camera, bool is_averaged)
+        : pixels(camera.width, camera.height, PixelSum{}), is_soft_apart(is_averaged) {
+        if (is_averaged) soft = Image<SoftSum>(camera.width, camera.height, SoftSum{});
+    }
+    Image<PixelSum> pixels;
+    bool is_soft_apart;   // else soft light is a part of the pixels' sums
+    Image<SoftSum> soft;  // empty where it is
 };
 
 /// Calls `body(y)` for every row, in bands with a progress report after each.
@@ -111,43 +132,41 @@ class ImageSampler {
   public:
     ImageSampler(const RenderScene& scene, const CausticMaps* caustics, const Camera& camera,
                  const TranslucentLight& translucent, const FinalOptions& options)
-        : tracer_(scene, caustics, options.paths, &translucent),
+        : tracer_(scene, caustics, path_options(options), &translucent),
           rays_(camera),
           origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
 
-    /// Brings the pixels of a row to `target(x)` samples, and those with soft light to
-    /// `soft_target(x)` (negative: all have it, as a part of the whole).
+    /// Brings the pixels of a row to `target(x)` samples, and those with soft light, where it is
+    /// apart, to `soft_target(x)`.
     template <typename Target, typename SoftTarget>
     void add_samples(int y, const Target& target, const SoftTarget& soft_target,
-                     Image<PixelSum>& sums) const {
+                     PictureSums& sums) const {
         PathGroup group(std::span(&tracer_, 1), rays_, origin_, y,
                         [&](int x, const PathWish& wish, const PathPair& pair) {
-                            add(pair.with(), wish, soft_target(x) < 0, sums(x, y));
+                            sums.pixels(x, y).add(pair.with().sharp());
+                            if (!sums.is_soft_apart) return;
+                            SoftSum& soft = sums.soft(x, y);
+                            soft.sums.add(pair.with(), wish.finds_soft);
+                            soft.count += wish.finds_soft ? 1 : 0;
                         });
-        for (int x = 0; x < sums.width(); ++x) {
-            const PixelSum& pixel = sums(x, y);
+        for (int x = 0; x < sums.pixels.width(); ++x) {
+            const int begin = sums.pixels(x, y).count, end = target(x);
             const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
-            int soft_left = soft_target(x) - pixel.soft_count;
-            const int end = target(x);
-            for (int k = pixel.count; k < end; ++k) {
-                group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)),
-                          {soft_target(x) < 0 || soft_left-- > 0, 1});
+            int soft_left = end - begin;
+            if (sums.is_soft_apart) soft_left = soft_target(x) - sums.soft(x, y).count;
+            for (int k = begin; k < end; ++k) {
+                group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)), {soft_left-- > 0, 1});
             }
         }
         group.finish();
     }
 
   private:
-    static void add(const PathResult& path, const PathWish& wish, bool is_whole, PixelSum& sums) {
-        if (!is_whole) {
-            sums.soft.add(path, wish.finds_soft);
-            sums.soft_count += wish.finds_soft ? 1 : 0;
-        }
-        const Rgb value = is_whole ? path.total() : path.sharp();
-        sums.sum += value.cast<double>();
-        sums.square += static_cast<double>(luminance(value)) * luminance(value);
-        ++sums.count;
+    static PathOptions path_options(const FinalOptions& options) {
+        PathOptions paths = options.paths;
+        paths.keeps_soft_apart = options.soft_samples_per_pixel > 0;
+        return paths;
     }
 
     PathTracer tracer_;
@@ -157,13 +176,13 @@ class ImageSampler {
 };
 
 /// Adds the soft light of each pixel's surface with that of its neighbours.
-void add_soft(const Image<PixelSum>& sums, const Camera& camera, ImageRgb& radiance) {
-    Image<SoftPixel> pixels(sums.width(), sums.height(), SoftPixel{});
-    for (std::size_t i = 0; i < sums.size(); ++i) pixels[i] = sums[i].soft.mean();
+void add_soft(const PictureSums& sums, const Camera& camera, ImageRgb& radiance) {
+    Image<SoftPixel> pixels(camera.width, camera.height, SoftPixel{});
+    for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = sums.soft[i].sums.mean();
     average_soft_light(pixels, camera);
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-        const auto n = static_cast<float>(sums[i].count);
-        radiance[i] += sums[i].soft.albedo / n * pixels[i].value.with;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+        const auto n = static_cast<float>(sums.pixels[i].count);
+        radiance[i] += sums.soft[i].sums.albedo / n * pixels[i].value.with;
     }
 }
 
@@ -178,7 +197,8 @@ template <typename MapsOf>
 RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
                             const FinalOptions& options, int pass_count, const MapsOf& maps_of,
                             const Progress& progress) {
-    Image<PixelSum> sums(camera.width, camera.height, PixelSum{});
+    const bool is_averaged = options.soft_samples_per_pixel > 0;
+    PictureSums sums(camera, is_averaged);
     // The same in all passes, so that the mean over samples is that over passes.
     const auto share_of = [&](int samples) {
         return std::max(1, (samples + pass_count - 1) / pass_count);
@@ -188,7 +208,6 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         VITRINE_CHECK(plan.same_size(*options.samples));
         for (std::size_t i = 0; i < plan.size(); ++i) plan[i] = share_of((*options.samples)[i]);
     }
-    const bool is_averaged = options.soft_samples_per_pixel > 0;
     const double soft_per_pass = options.soft_samples_per_pixel / pass_count;
     TranslucentLight translucent;
     for (int pass = 0; pass < pass_count; ++pass) {
@@ -205,23 +224,20 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
                 camera, progress.part(start + from * share, start + to * share), [&](int y) {
                     sampler.add_samples(
                         y, [&](int x) { return plan(x, y) * (pass + 1); },
-                        [&](int x) {
-                            return is_averaged ? soft_share(soft_per_pass * (pass + 1), x, y) : -1;
-                        },
-                        sums);
+                        [&](int x) { return soft_share(soft_per_pass * (pass + 1), x, y); }, sums);
                 });
         };
         const bool is_planned = pass > 0 || options.samples || options.max_samples_per_pixel <= 0;
         run(0.15, is_planned ? 1.0 : 0.4);
         if (!is_planned) {
-            plan = plan_pass(sums, options, pass_count);
+            plan = plan_pass(sums.pixels, options, pass_count);
             run(0.4, 1.0);
         }
     }
     RenderedImage image{ImageRgb(camera.width, camera.height), ImageF(camera.width, camera.height)};
-    for (std::size_t i = 0; i < sums.size(); ++i) {
-        image.radiance[i] = sums[i].mean().cast<float>();
-        image.variance[i] = static_cast<float>(sums[i].variance());
+    for (std::size_t i = 0; i < sums.pixels.size(); ++i) {
+        image.radiance[i] = sums.pixels[i].mean().cast<float>();
+        image.variance[i] = static_cast<float>(sums.pixels[i].variance());
     }
     if (is_averaged) add_soft(sums, camera, image.radiance);
     return image;

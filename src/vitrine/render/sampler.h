@@ -17,6 +17,7 @@ inline Vec2f sobol_pair(std::uint32_t index, std::uint32_t seed) {
 
 class PathSampler {
   public:
+    PathSampler() = default;
     /// @param stream key of the pixel or photon set; @param index of the sample within it
     PathSampler(std::uint64_t stream, std::uint32_t index)
         : mixed_stream_(mix_bits(stream)), index_(index) {}
@@ -77,8 +78,8 @@ class PathSampler {
                         (static_cast<std::uint64_t>(depth) * 16u + unsigned(purpose)));
     }
 
-    std::uint64_t mixed_stream_;
-    std::uint32_t index_;
+    std::uint64_t mixed_stream_ = 0;
+    std::uint32_t index_ = 0;
 };
 
 }  // namespace vitrine
