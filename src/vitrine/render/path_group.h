@@ -12,7 +12,7 @@ template <typename Use>
 class PathGroup {
   public:
     /// @param tracers of which each path names one: they differ in their photons alone
-    /// @param y row of the pixels
+    /// @param y first row of the pixels
     PathGroup(std::span<const PathTracer> tracers, const CameraRays& rays, const Vec3f& origin,
               int y, Use use)
         : tracers_(tracers),
@@ -23,6 +23,11 @@ class PathGroup {
           workspace_(tracers.front()),
           use_(std::move(use)) {}
 
+    /// Those that follow are of row `y`; those that wait are followed.
+    void begin_row(int y) {
+        finish();
+        y_ = y;
+    }
     /// @param x of the path's pixel; @param sampler of stream_key(seed, x, y) and the sample's
     /// index
     void add(std::size_t tracer, int x, const PathSampler& sampler, const PathWish& wish) {

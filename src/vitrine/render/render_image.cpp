@@ -100,14 +100,17 @@ struct PictureSums {
     Image<SoftSum> soft;  // empty where it is
 };
 
-/// Calls `body(y)` for every row, in bands with a progress report after each.
+/// Calls `body(begin, end)` for a few rows at a time, in bands with a progress report after each.
 template <typename Body>
-void for_each_row(const Camera& camera, const Progress& progress, const Body& body) {
-    constexpr int kBand = 16;
+void for_all_rows(const Camera& camera, const Progress& progress, const Body& body) {
+    constexpr int kBand = 32;
+    constexpr std::size_t kRows = 2;
     for (int band = 0; band < camera.height; band += kBand) {
         const int rows = std::min(kBand, camera.height - band);
-        parallel_for(static_cast<std::size_t>(rows), 1,
-                     [&](std::size_t row) { body(band + static_cast<int>(row)); });
+        parallel_for_blocks(static_cast<std::size_t>(rows), kRows,
+                            [&](std::size_t begin, std::size_t end) {
+                                body(band + static_cast<int>(begin), band + static_cast<int>(end));
+                            });
         progress.update(static_cast<double>(band + rows) / camera.height, "render");
     }
 }
@@ -137,11 +140,12 @@ class ImageSampler {
           origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
 
-    /// Brings the pixels of a row to `target(x)` samples, and those with soft light, where it is
-    /// apart, to `soft_target(x)`.
+    /// Brings the pixels of some rows to `target(x, y)` samples, and those with soft light, where
+    /// it is apart, to `soft_target(x, y)`.
     template <typename Target, typename SoftTarget>
-    void add_samples(int y, const Target& target, const SoftTarget& soft_target,
-                     PictureSums& sums) const {
+    void add_samples(int begin_row, int end_row, const Target& target,
+                     const SoftTarget& soft_target, PictureSums& sums) const {
+        int y = begin_row;
         PathGroup group(std::span(&tracer_, 1), rays_, origin_, y,
                         [&](int x, const PathWish& wish, const PathPair& pair) {
                             sums.pixels(x, y).add(pair.with().sharp());
@@ -150,16 +154,20 @@ class ImageSampler {
                             soft.sums.add(pair.with(), wish.finds_soft);
                             soft.count += wish.finds_soft ? 1 : 0;
                         });
-        for (int x = 0; x < sums.pixels.width(); ++x) {
-            const int begin = sums.pixels(x, y).count, end = target(x);
-            const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
-            int soft_left = end - begin;
-            if (sums.is_soft_apart) soft_left = soft_target(x) - sums.soft(x, y).count;
-            for (int k = begin; k < end; ++k) {
-                group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)), {soft_left-- > 0, 1});
+        for (; y < end_row; ++y) {
+            group.begin_row(y);
+            for (int x = 0; x < sums.pixels.width(); ++x) {
+                const int begin = sums.pixels(x, y).count, end = target(x, y);
+                const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
+                int soft_left = end - begin;
+                if (sums.is_soft_apart) soft_left = soft_target(x, y) - sums.soft(x, y).count;
+                for (int k = begin; k < end; ++k) {
+                    group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)),
+                              {soft_left-- > 0, 1});
+                }
             }
+            group.finish();
         }
-        group.finish();
     }
 
   private:
@@ -220,11 +228,13 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         }
         const ImageSampler sampler(scene, maps, camera, translucent, options);
         const auto run = [&](double from, double to) {
-            for_each_row(
-                camera, progress.part(start + from * share, start + to * share), [&](int y) {
+            for_all_rows(
+                camera, progress.part(start + from * share, start + to * share),
+                [&](int begin_row, int end_row) {
                     sampler.add_samples(
-                        y, [&](int x) { return plan(x, y) * (pass + 1); },
-                        [&](int x) { return soft_share(soft_per_pass * (pass + 1), x, y); }, sums);
+                        begin_row, end_row, [&](int x, int y) { return plan(x, y) * (pass + 1); },
+                        [&](int x, int y) { return soft_share(soft_per_pass * (pass + 1), x, y); },
+                        sums);
                 });
         };
         const bool is_planned = pass > 0 || options.samples || options.max_samples_per_pixel <= 0;
