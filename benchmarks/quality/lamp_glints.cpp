@@ -27,16 +27,18 @@ Rgb follow(const RenderScene& scene, const Vec3f& origin, const Vec3f& direction
     }
     if (hit.is_hit() && scene.dielectric(hit.part)) {
         const ShadingPoint point = scene.surface(hit, direction);
-        const InterfaceEvent event = cross_interface(scene, point, direction, media);
-        const float reflected = event.is_optical ? event.reflectance : 0.0f;
+        const Boundary boundary = cross_boundary(scene, point.part, point.is_front, media);
+        BentRays rays{0.0f, direction, direction};  // where the boundary is not optical
+        if (boundary.eta != 1.0f) rays = bend(point, direction, boundary.eta);
+        const float reflected = rays.reflectance;
         if (reflected > 0) {
-            sum += reflected * follow(scene, scene.leave(point, event.reflected), event.reflected,
+            sum += reflected * follow(scene, scene.leave(point, rays.reflected), rays.reflected,
                                       media, share * reflected, interfaces + 1);
         }
         if (reflected < 1) {
-            sum += (1 - reflected) * follow(scene, scene.leave(point, event.refracted),
-                                            event.refracted, event.beyond, share * (1 - reflected),
-                                            interfaces + 1);
+            sum += (1 - reflected) * follow(scene, scene.leave(point, rays.refracted),
+                                            rays.refracted, boundary.beyond,
+                                            share * (1 - reflected), interfaces + 1);
         }
     }
     return sum * scene.transmittance(media, distance);
