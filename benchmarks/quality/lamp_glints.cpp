@@ -36,9 +36,9 @@ Rgb follow(const RenderScene& scene, const Vec3f& origin, const Vec3f& direction
                                       media, share * reflected, interfaces + 1);
         }
         if (reflected < 1) {
-            sum += (1 - reflected) * follow(scene, scene.leave(point, rays.refracted),
-                                            rays.refracted, boundary.beyond,
-                                            share * (1 - reflected), interfaces + 1);
+            sum +=
+                (1 - reflected) * follow(scene, scene.leave(point, rays.refracted), rays.refracted,
+                                         boundary.beyond, share * (1 - reflected), interfaces + 1);
         }
     }
     return sum * scene.transmittance(media, distance);
