@@ -27,6 +27,12 @@ double white_of(const Photo& photo) {
     return std::max(quantile(std::move(values), 0.95), 1e-9) / srgb_to_linear(0.8f);
 }
 
+/// The silhouette without any shading: where shape from known light starts.
+Relief inflated_silhouette(const PhotoAnalysis& analysis, ReliefOptions options) {
+    options.alpha = 0;
+    return shade_to_shape(analysis.highlights.diffuse, analysis.photo.mask, options);
+}
+
 /// Only a material photo may show a cluster: what is dressed is one body.
 enum class Role { Material, Object };
 
@@ -75,9 +81,7 @@ PhotoAnalysis analyse(const Photo& photo, Role role, const TransferAnalysisOptio
         if (role == Role::Material && !analysis.relief.is_cluster()) {
             progress.update(0.5, "shape and lights");
             analysis.explaining = estimate(analysis.highlight_lights, false);
-            ReliefOptions dome = options.relief;
-            dome.alpha = 0;
-            const Relief inflated = shade_to_shape(analysis.highlights.diffuse, photo.mask, dome);
+            const Relief inflated = inflated_silhouette(analysis, options.relief);
             for (int round = 0; round < options.refinement_rounds; ++round) {
                 light_options.known_lamps.clear();
                 for (const ViewLight& light : analysis.explaining.lights.lights)
@@ -138,16 +142,25 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
             analysis.relief, shown, analysis.highlights.grown, light, lifted.medium, options.back);
         if (worn) analysis.relief = *worn;
     }
-    progress.update(0.9, "thickness");
+    progress.update(0.9, "shape");
 
     lifted.brightness = limit_albedo(lifted.medium);
 
     TranslucentRenderOptions render_options;
     render_options.eta = lifted.medium.is_fresnel ? options.bssrdf.eta : 1.0;
     render_options.use_curved_body = options.bssrdf.use_curved_body;
-    lifted.rendered = render_object(analysis.relief, analysis.explaining.lights,
-                                    lifted.medium.profile(), render_options);
-    for (Rgb& pixel : lifted.rendered) pixel *= static_cast<float>(lifted.brightness);
+    const auto render = [&](const Relief& relief) {
+        return scaled_image(render_object(relief, analysis.explaining.lights,
+                                          lifted.medium.profile(), render_options),
+                            lifted.brightness);
+    };
+    if (options.refinement_rounds > 0 && options.light_method != LightMethod::LopezMoreno) {
+        analysis.relief =
+            refine_front(analysis.relief, inflated_silhouette(analysis, options.relief), shown,
+                         analysis.highlights.grown, analysis.explaining.lights,
+                         analysis.explaining.kernel_px, options.lights.eta, render, options.front);
+    }
+    lifted.rendered = render(analysis.relief);
     lifted.self_psnr_db =
         encoded_psnr(lifted.rendered, shown, photo.mask, analysis.highlights.grown);
     Rgbd mean = Rgbd::Zero();

@@ -7,6 +7,7 @@
 #include "capture/photo.h"
 #include "estimate/back_surface.h"
 #include "estimate/bssrdf.h"
+#include "estimate/front_refinement.h"
 #include "estimate/highlights.h"
 #include "estimate/lopez_moreno.h"
 #include "estimate/translucency_lights.h"
@@ -50,7 +51,8 @@ struct TransferAnalysisOptions {
     BallOptions balls;
     /// Of a material photo's one body: shape by the lights found, then lights again, so often.
     int refinement_rounds = 2;
-    bool use_back = true;  ///< of the same: how thick it is where light shines through
+    bool use_back = true;          ///< of the same: how thick it is where light shines through
+    FrontRefinementOptions front;  ///< of the same, last: until its rendering is the photo
     BackSurfaceOptions back;
     LightMethod light_method = LightMethod::Diffusion;
     /// How firmly the roles are believed: 1, the material photo is soft because of its material
