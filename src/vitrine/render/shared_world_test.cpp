@@ -73,6 +73,12 @@ TEST(SharedWorld, RaysMeetTheNearestOfBoth) {
     const Ray up{Vec3f(0.2f, 0, 0.05f), Vec3f(0, 0, 1), 0.0f, 1e30f, kAllParts};
     EXPECT_TRUE(both.is_occluded(up));
     EXPECT_FALSE(world.is_occluded(up));
+    // Rays of both scenes in one list: each has its own mask.
+    std::vector<BareRay> mixed;
+    for (int i = 0; i < 12; ++i)
+        mixed.emplace_back(up.origin, up.direction, 1e30f, i % 3 ? kRealParts : kAllParts);
+    both.occluded(mixed);
+    for (std::size_t i = 0; i < mixed.size(); ++i) EXPECT_EQ(mixed[i].is_hidden(), i % 3 == 0) << i;
     EXPECT_EQ(both.nearest(Vec3f(0.2f, 0, 0.22f), 0.05f).part, 2);
     EXPECT_EQ(both.nearest(Vec3f(0.2f, 0, 0.01f), 0.05f).part, 0);
 }
