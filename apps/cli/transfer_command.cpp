@@ -92,8 +92,10 @@ void add_method(CLI::App& command, TransferRequest& request, TransferTexts& text
                        "one body")
            ->check(CLI::IsMember({"auto", "inflated"})));
     in(command
-           .add_option("--refine", analysis.refinement_rounds,
-                       "Rounds of shape by the lights found and lights again (material photo)")
+           .add_option(
+               "--refine", analysis.refinement_rounds,
+               "Rounds of shape by the lights found and lights again, then the front until its "
+               "rendering shows the photo (material photo); 0: none of it")
            ->check(CLI::Range(0, 8)));
     in(command
            .add_option("--transmittance", texts.transmittance,
