@@ -1,7 +1,7 @@
 // Nine worlds of half B made here: three materials x three shapes, random lights, as an 8-bit
 // picture with noise and a highlight. Prints how well material, lights and transfers come back.
 //
-//   vitrine_transfer_worlds [FIRST LAST] [--flat] [--ground] [--refine N]
+//   vitrine_transfer_worlds [FIRST [LAST]] [--flat] [--ground] [--refine N]
 //
 // The truth is a dipole, summed on a finer lattice than the estimator's but by the same integral
 // (with C(s) of a closed body; --flat leaves it out on both sides). --ground adds light from below.
@@ -309,7 +309,7 @@ int main(int argc, char** argv) {
             numbers.push_back(std::atoi(argv[i]));
         }
     }
-    if (numbers.size() == 2) first = numbers[0], last = numbers[1];
+    if (!numbers.empty()) first = numbers.front(), last = numbers.back();
     std::vector<Row> rows;
     for (int i = first; i <= last && i < 9; ++i)
         rows.push_back(run_world(i, use_curved_body, with_ground, refinement_rounds));

@@ -144,7 +144,11 @@ void run_size(const Photo& source, const Photo& target, double megapixels) {
 }
 
 int run(int argc, char** argv) {
-    if (argc < 2) {
+    std::vector<double> sizes;
+    for (int i = 2; i < argc; ++i) sizes.push_back(std::atof(argv[i]));
+    const bool is_size_wrong =
+        std::any_of(sizes.begin(), sizes.end(), [](double s) { return s <= 0; });
+    if (argc < 2 || is_size_wrong) {
         std::printf("usage: vitrine_transfer_speed PHOTOS [MEGAPIXELS ...]   (data/photos)\n");
         return 2;
     }
@@ -155,8 +159,6 @@ int run(int argc, char** argv) {
         return read_photo(folder / (name + ".png"), options);
     };
     const Photo source = photo("grapes"), target = photo("bust");
-    std::vector<double> sizes;
-    for (int i = 2; i < argc; ++i) sizes.push_back(std::atof(argv[i]));
     if (sizes.empty()) sizes = {0.25, 1.0, 4.0};
     for (const double size : sizes) run_size(source, target, size);
     return 0;
