@@ -154,13 +154,17 @@ LiftedMaterial lift_material(const Photo& photo, const TransferAnalysisOptions& 
                                           lifted.medium.profile(), render_options),
                             lifted.brightness);
     };
-    if (options.refinement_rounds > 0 && options.light_method != LightMethod::LopezMoreno) {
-        analysis.relief =
+    if (options.refinement_rounds > 0 && options.light_method != LightMethod::LopezMoreno &&
+        !analysis.relief.is_cluster()) {
+        RefinedFront front =
             refine_front(analysis.relief, inflated_silhouette(analysis, options.relief), shown,
                          analysis.highlights.grown, analysis.explaining.lights,
                          analysis.explaining.kernel_px, options.lights.eta, render, options.front);
+        analysis.relief = std::move(front.relief);
+        lifted.rendered = std::move(front.rendered);
+    } else {
+        lifted.rendered = render(analysis.relief);
     }
-    lifted.rendered = render(analysis.relief);
     lifted.self_psnr_db =
         encoded_psnr(lifted.rendered, shown, photo.mask, analysis.highlights.grown);
     Rgbd mean = Rgbd::Zero();

@@ -37,27 +37,31 @@ ImageF shortfall(const ImageRgb& rendered, const ImageRgb& shown, const Relief& 
 
 }  // namespace
 
-Relief refine_front(const Relief& start, const Relief& dome, const ImageRgb& diffuse,
-                    const Mask& excluded, const ViewLights& lights, double kernel_px, double eta,
-                    const ReliefRenderer& render, const FrontRefinementOptions& options) {
-    if (start.is_cluster() || lights.lights.empty()) return start;
+RefinedFront refine_front(const Relief& start, const Relief& dome, const ImageRgb& diffuse,
+                          const Mask& excluded, const ViewLights& lights, double kernel_px,
+                          double eta, const ReliefRenderer& render,
+                          const FrontRefinementOptions& options) {
+    VITRINE_CHECK(!start.is_cluster());
+    RefinedFront best{start, render(start)};
+    if (lights.lights.empty()) return best;
     ReliefRefinementOptions refinement;
     refinement.bending = options.bending;
     const ImageF thickness = thickness_of(start);
-    Relief best = start;
-    ImageRgb rendered = render(best), target = diffuse;
-    double lowest = misfit(rendered, diffuse, start, excluded);
+    ImageRgb target = diffuse;
+    double lowest = misfit(best.rendered, diffuse, start, excluded);
     for (int round = 0; round < options.rounds; ++round) {
-        const ImageF factor = gaussian_blur(shortfall(rendered, diffuse, start, excluded),
+        const ImageF factor = gaussian_blur(shortfall(best.rendered, diffuse, start, excluded),
                                             options.smooth * start.inradius_px);
         for (std::size_t i = 0; i < target.size(); ++i) target[i] *= factor[i];
-        const Relief relief = with_thickness(
-            refine_relief(dome, target, excluded, lights, kernel_px, eta, refinement), thickness);
-        rendered = render(relief);
-        const double left = misfit(rendered, diffuse, start, excluded);
+        RefinedFront next{with_thickness(refine_relief(dome, target, excluded, lights, kernel_px,
+                                                       eta, refinement),
+                                         thickness),
+                          {}};
+        next.rendered = render(next.relief);
+        const double left = misfit(next.rendered, diffuse, start, excluded);
         if (left > 0.99 * lowest) break;
         lowest = left;
-        best = relief;
+        best = std::move(next);
     }
     return best;
 }

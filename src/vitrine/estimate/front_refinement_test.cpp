@@ -52,7 +52,8 @@ struct BumpyWorld {
     }
     Relief refined(const ImageRgb& picture) const {
         return refine_front(smooth, smooth, picture, Mask(), lights, 6, 1.0,
-                            [&](const Relief& relief) { return render(relief); });
+                            [&](const Relief& relief) { return render(relief); })
+            .relief;
     }
 };
 
