@@ -4,120 +4,15 @@
 #include "compose/composite.h"
 #include "image/filter.h"
 #include "image/image_io.h"
+#include "insert_regions.h"
 #include "lamp_glints.h"
+#include "rerendered_truth.h"
 
 #include <cstdio>
 
 namespace vitrine {
 namespace {
 namespace fs = std::filesystem;
-
-Rgb clipped(const Rgb& v, float top) { return v.max(0.0f).min(top); }
-
-constexpr double kBlurPx = 2.0;
-
-/// Clipped as the camera does, then with - without.
-ImageRgb raw_difference(const ImageRgb& with, const ImageRgb& without, float top) {
-    ImageRgb d(with.width(), with.height());
-    for (std::size_t i = 0; i < d.size(); ++i) {
-        d[i] = clipped(with[i], top) - clipped(without[i], top);
-    }
-    return d;
-}
-
-/// Variance of the pixel noise of `error`, from how each pixel differs from its four neighbours
-/// (what is smooth drops out), and what the blur leaves of it.
-ImageRgb blurred_noise_variance(const ImageRgb& error) {
-    ImageRgb variance(error.width(), error.height());
-    for (int y = 1; y + 1 < error.height(); ++y) {
-        for (int x = 1; x + 1 < error.width(); ++x) {
-            const Rgb around =
-                (error(x - 1, y) + error(x + 1, y) + error(x, y - 1) + error(x, y + 1)) / 4.0f;
-            variance(x, y) = (error(x, y) - around).square() /
-                             static_cast<float>(1.25 * 4 * kPi * kBlurPx * kBlurPx);
-        }
-    }
-    return variance;
-}
-
-struct RegionError {
-    double error = 0;
-    double floor = 0;  ///< the truth's noise far from any change
-    double noise = 0;  ///< that of both pictures within the region
-    double power = 0;  ///< of the true change
-    std::size_t count = 0;
-};
-
-RegionError region_error(const ImageRgb& truth, const ImageRgb& estimate, double noise_rms,
-                         const ImageRgb& noise_variance, const Mask& inside) {
-    double difference = 0, noise = 0;
-    RegionError result;
-    double& power = result.power;
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-        if (inside[i] < 128) continue;
-        difference += (estimate[i] - truth[i]).square().sum();
-        power += truth[i].square().sum();
-        noise += noise_variance[i].sum();
-        ++result.count;
-    }
-    if (power > 0) {
-        result.noise = std::sqrt(noise / power);
-        result.error = std::sqrt(difference / power);
-        result.floor = noise_rms * std::sqrt(3.0 * static_cast<double>(result.count) / power);
-    }
-    return result;
-}
-
-/// Where the estimate says that nothing changed: root mean square of the true difference, which is
-/// the truth's noise, and what neighbouring pixels say of that noise.
-struct FarNoise {
-    double rms = 0, by_neighbours = 0;
-};
-FarNoise far_noise(const ImageRgb& truth, const ImageRgb& raw_truth, const ImageRgb& estimate,
-                   double level) {
-    const ImageRgb variance = blurred_noise_variance(raw_truth);
-    double sum = 0, predicted = 0;
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < truth.size(); ++i) {
-        if (estimate[i].abs().maxCoeff() > 0.002 * level) continue;
-        sum += truth[i].square().sum();
-        predicted += variance[i].sum();
-        count += 3;
-    }
-    const double n = std::max<double>(1, static_cast<double>(count));
-    return {std::sqrt(sum / n), std::sqrt(predicted / n)};
-}
-
-/// One frame: pictures of the change and the regions it falls into.
-struct TrueFrame {
-    Camera camera;
-    ImageRgb plate, with;  // of the truth
-    ImageRgb raw_true, d_true;
-    double level = 0;
-    Mask regions[4];  // see kRegionNames
-};
-const char* const kRegionNames[4] = {"object", "darker", "brighter", "all"};
-
-TrueFrame read_frame(const fs::path& folder, const Camera& camera, float top) {
-    TrueFrame frame;
-    frame.camera = camera;
-    frame.plate = read_exr_rgb(folder / ".." / "linear" / (camera.id + ".exr"));
-    frame.with = read_exr_rgb(folder / (camera.id + "_with.exr"));
-    frame.raw_true = raw_difference(frame.with, frame.plate, top);
-    frame.d_true = gaussian_blur(frame.raw_true, kBlurPx);
-    for (const Rgb& p : frame.plate) frame.level += clipped(p, top).mean();
-    frame.level /= static_cast<double>(frame.plate.size());
-    const Mask virtual_mask = read_mask(folder / (camera.id + "_virtual_mask.png"));
-    const Mask around = dilate(virtual_mask, 4);
-    frame.regions[0] = erode(virtual_mask, 2);
-    for (int k = 1; k < 4; ++k) frame.regions[k] = Mask(camera.width, camera.height);
-    for (std::size_t i = 0; i < around.size(); ++i) {
-        frame.regions[3][i] = 255;
-        if (around[i] >= 128 || !(frame.d_true[i].abs().maxCoeff() > 0.02 * frame.level)) continue;
-        frame.regions[frame.d_true[i].sum() < 0 ? 1 : 2][i] = 255;
-    }
-    return frame;
-}
 
 /// A sum over a region and its standard error, by how its tiles of 16 x 16 pixels differ: errors of
 /// tiles are independent, those of neighbours are blurred into each other.
@@ -369,8 +264,16 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
             if (options.path_samples > 0) {
                 paths = change_by_paths(truth, part, camera, options.path_samples, window, image,
                                         frame, top);
+                if (!options.rerendered.empty()) {
+                    compare_rerendered(options.rerendered, frame, "paths",
+                                       read_virtual_mask(folder, camera), *paths, nullptr, top);
+                }
             }
             print_shares(frame, d_render, *d_second, paths ? &*paths : nullptr, in_window);
+        }
+        if (!options.rerendered.empty()) {
+            compare_rerendered(options.rerendered, frame, "ours", read_virtual_mask(folder, camera),
+                               d_render, other, top);
         }
         if (std::holds_alternative<Dielectric>(part.material)) {
             print_glints(frame, renderer.scene(), image, d_render, noise_variance, top);
@@ -387,6 +290,8 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
         }
         write_side_by_side(out / (stem + "_error.png"), {error}, truth.linear_scale);
         write_composite_exr(out / (stem + ".exr"), frame.plate, image, camera);
+        write_exr(out / (stem + "_with.exr"), image.with, {.half = false});
+        write_exr(out / (stem + "_without.exr"), image.without, {.half = false});
     }
 }
 

@@ -5,6 +5,7 @@
 #include "image/filter.h"
 #include "image/image_io.h"
 #include "math/statistics.h"
+#include "rerendered_truth.h"
 
 #include <cstdio>
 
@@ -116,6 +117,36 @@ RelativeError relative_error(const RenderedImage& image, const ImageRgb& referen
     return result;
 }
 
+/// Mean relative error over the pixels that count.
+double mean_error(const ImageRgb& image, const ImageRgb& reference, const Mask& use) {
+    double sum = 0;
+    for (std::size_t i = 0; i < use.size(); ++i) {
+        if (use[i] > 127) {
+            sum += std::abs(double(image[i][1]) - double(reference[i][1])) / reference[i][1];
+        }
+    }
+    return sum / static_cast<double>(std::max<std::size_t>(1, count_inside(use)));
+}
+
+/// The same errors where the truth was rendered again: of our picture and of the given one.
+/// @param plain pixels that count
+void compare_rerendered_plain(const fs::path& folder, const std::string& frame,
+                              const RenderedImage& ours, const ImageRgb& given, Mask plain) {
+    const auto again = read_rerendered(folder, frame, given);
+    if (!again) return;
+    for (std::size_t i = 0; i < plain.size(); ++i) plain[i] = std::min(plain[i], again->known[i]);
+    const RelativeError e = relative_error(ours, again->mean, plain);
+    std::printf(
+        "%s rerendered (%d seeds): mean relative error against given: ours %.4f, rerendered %.4f; "
+        "against rerendered: ours %.4f (pixel noise alone %.4f, ours alone %.4f; means of 8 x 8 "
+        "pixels %.4f), given %.4f (8 x 8 %.4f); noise of rerendered %.4f; bias ours %+.4f (%zu "
+        "px)\n",
+        frame.c_str(), again->seeds, mean_error(ours.radiance, given, plain),
+        mean_error(again->mean, given, plain), e.mean, e.noise, e.ours, e.coarse,
+        mean_error(given, again->mean, plain), coarse_error(given, again->mean, plain),
+        0.5 * mean_error(again->even, again->odd, plain), e.bias, e.count);
+}
+
 }  // namespace
 
 void compare_plain(const RenderQualityOptions& options, const TruthScene& truth,
@@ -168,6 +199,9 @@ void compare_plain(const RenderQualityOptions& options, const TruthScene& truth,
             "%.4f (%zu px)  %.1f s\n",
             camera.id.c_str(), e.mean, e.median, e.noise, e.ours, e.even, e.coarse, e.bias, e.count,
             flux / std::max(1e-30, flux_true), correlation, bright, seconds);
+        if (!options.rerendered.empty()) {
+            compare_rerendered_plain(options.rerendered, camera.id, image, reference, plain);
+        }
         if (!options.out.empty()) {
             write_side_by_side(fs::path(options.out) / (camera.id + "_plain.png"),
                                {image.radiance, reference}, truth.linear_scale);

@@ -19,6 +19,7 @@ struct RenderQualityOptions {
     double crease_deg = kCreaseDeg, object_crease_deg = kCreaseDeg;
     bool has_second_seed = false;
     int path_samples = 0;
+    std::string rerendered;   ///< folder of the truth rendered again; empty: none
     std::vector<int> window;  ///< x, y, width, height of the picture of paths; empty: all of it
     std::vector<std::string> frames;
     DifferentialOptions differential;

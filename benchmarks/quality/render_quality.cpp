@@ -31,6 +31,9 @@ int run(int argc, char** argv) {
     app.add_option("--path-samples", options.path_samples,
                    "Paths a pixel, without photons, to tell our error from the truth's; 0: none");
     app.add_option("--window", options.window, "Of those: x y width height")->expected(4);
+    app.add_option("--truth", options.rerendered,
+                   "Folder of the truth rendered again by cycles_truth.py, to measure it as well")
+        ->check(CLI::ExistingDirectory);
     app.add_flag("--skip-plain", skip_plain, "Insertion alone");
     CLI11_PARSE(app, argc, argv);
     if (!options.out.empty()) fs::create_directories(options.out);
