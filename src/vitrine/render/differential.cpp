@@ -44,8 +44,9 @@ struct Plan {
     Image<int> sharp, soft;
 };
 
-/// Of a picture's width.
-constexpr double kSurroundings = 0.0125;
+/// Of a picture's width. Less would make the number of paths depend on whether the first of them
+/// met something bright, and the mean darker: 2 % of the change at half of this.
+constexpr double kSurroundings = 0.025;
 
 /// Of the change of soft light by one path, over the surroundings of each pixel: few paths meet
 /// the brightest places, and where none of them has yet the noise is not smaller.

@@ -53,6 +53,15 @@ Reach reach_of(const Image<SoftPixel>& pixels, const Camera& camera, const Vec3f
     return reach;
 }
 
+/// Paths that the neighbour at (dx, dy) counts for: no more than the one opposite of it has. Pixels
+/// where more light changes get more paths, and would pull the mean towards themselves.
+float balanced_weight(const Image<SoftPixel>& pixels, int x, int y, int dx, int dy) {
+    const float weight = pixels(x + dx, y + dy).value.weight;
+    if (!pixels.contains(x - dx, y - dy)) return weight;
+    const float opposite = pixels(x - dx, y - dy).value.weight;
+    return opposite > 0 ? std::min(weight, opposite) : weight;
+}
+
 /// One level: a mean of 5 x 5 pixels `step` apart, mixed with the pixel itself so that the area's
 /// variance grows by no more than `variance_px2`.
 SoftValue mean_around(const Image<SoftPixel>& pixels, int x, int y, int step, const Reach& reach,
@@ -80,7 +89,7 @@ SoftValue mean_around(const Image<SoftPixel>& pixels, int x, int y, int step, co
                 kernel *= facing(pixel, other);
                 if (kernel <= 0) continue;
             }
-            const float w = kernel * other.value.weight;
+            const float w = kernel * balanced_weight(pixels, x, y, i * step, j * step);
             mean.with += w * other.value.with;
             mean.shadow += w * other.value.shadow;
             mean.diffuse += w * other.value.diffuse;

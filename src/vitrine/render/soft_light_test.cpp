@@ -59,6 +59,21 @@ TEST(SoftLight, SlopesStayAndNoiseGoesByWhatIsPromised) {
     EXPECT_NEAR(promised / square, 1, 0.5);  // few independent patches
 }
 
+TEST(SoftLight, PixelsWithMorePathsDoNotPullTheMean) {
+    const auto slope = [](int x, int) { return 1.0f + 0.05f * float(x); };
+    Image<SoftPixel> pixels = plane(0.1f, slope);
+    for (int y = 0; y < kHeight; ++y) {
+        for (int x = 0; x < kWidth; ++x) {
+            pixels(x, y).value.weight = 2 * std::exp(0.02f * float(x));
+        }
+    }
+    average_soft_light(pixels, camera_above());
+    // By their paths alone they would come out by 100 px2 * 0.02 * 0.05 = 0.1 too bright.
+    for (int x = 64; x < kWidth - 64; ++x) {
+        EXPECT_NEAR(pixels(x, kHeight / 2).value.with[0], slope(x, 0), 0.01f);
+    }
+}
+
 TEST(SoftLight, NothingIsCarriedAcrossAnEdgeOrFromAnotherHeight) {
     for (const bool is_edge : {true, false}) {
         Image<SoftPixel> pixels =
