@@ -101,20 +101,25 @@ void compare_rerendered(const fs::path& folder, const TrueFrame& given, const ch
         const Mask here = both(given.regions[k], window), region = both(again.regions[k], window);
         if (count_inside(region) == 0) continue;
         const double in_given = power(here, given.d_true), in_again = power(region, again.d_true);
-        const double error = distance(region, ours, again.d_true);
         const double noise = 0.25 * distance(region, even, odd);
+        const auto error = [&](const ImageRgb& d) { return distance(region, d, again.d_true); };
+        const auto without_noise = [&](const ImageRgb& d) {
+            return relative(std::max(0.0, error(d) - noise), in_again);
+        };
         std::printf(
             "%s rerendered (%d seeds) %s: window has %.0f %% of the power; against given: %s %.3f, "
-            "rerendered %.3f; against rerendered: %s %.3f; noise of rerendered %.3f",
+            "rerendered %.3f; against rerendered: %s %.3f, given %.3f; noise of rerendered %.3f, "
+            "without it %s %.3f, given %.3f",
             id.c_str(), std::min(plate->seeds, with->seeds), kRegionNames[k],
             100 * in_given / power(given.regions[k], given.d_true), name,
             relative(distance(here, ours, given.d_true), in_given),
             relative(distance(here, again.d_true, given.d_true), in_given), name,
-            relative(error, in_again), relative(noise, in_again));
+            relative(error(ours), in_again), relative(error(given.d_true), in_again),
+            relative(noise, in_again), name, without_noise(ours), without_noise(given.d_true));
         if (second) {
             const double own = 0.5 * distance(region, ours, *second);
-            std::printf(", ours %.3f, error without both %.3f", relative(own, in_again),
-                        relative(std::max(0.0, error - noise - own), in_again));
+            std::printf(" (%s noise %.3f, without that %.3f)", name, relative(own, in_again),
+                        relative(std::max(0.0, error(ours) - noise - own), in_again));
         }
         const auto change = [&](const ImageRgb& d) {
             return sum_over(region, [&](std::size_t i) { return double(d[i].sum()); });
