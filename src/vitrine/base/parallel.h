@@ -4,6 +4,8 @@
 // index; sum per block and add the blocks in order (`parallel_sum`): never an atomic float.
 #pragma once
 
+#include "base/progress.h"
+
 #include <cstddef>
 #include <functional>
 #include <vector>
@@ -17,6 +19,13 @@ int thread_count();
 /// Calls `body(begin, end)` for consecutive blocks of at most `grain` items of [0, count).
 /// An exception in a body is rethrown here.
 void parallel_for_blocks(std::size_t count, std::size_t grain,
+                         const std::function<void(std::size_t begin, std::size_t end)>& body);
+
+/// As above for long work. After blocks of the calling thread's own it reports the share of all
+/// that are done; no thread waits for another before the end.
+/// @throws Cancelled when the callback asked to stop.
+void parallel_for_blocks(std::size_t count, std::size_t grain, const Progress& progress,
+                         std::string_view what,
                          const std::function<void(std::size_t begin, std::size_t end)>& body);
 
 /// Calls `body(i)` for each i of [0, count), in blocks of `grain`.
