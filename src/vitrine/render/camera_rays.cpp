@@ -2,14 +2,15 @@
 
 namespace vitrine {
 
-CameraRays::CameraRays(const Camera& camera) {
+CameraRays::CameraRays(const Camera& camera) : origin_(camera.centre_in_world().cast<float>()) {
     const Mat3 world_from_camera = camera.cam_from_world.rotation.transpose();
     right_ = (world_from_camera.col(0) / camera.fx).cast<float>();
     down_ = (world_from_camera.col(1) / camera.fy).cast<float>();
     corner_ = (world_from_camera * camera.ray_in_camera(0, 0)).cast<float>();
 }
 
-void CameraRays::aim(std::span<const int> columns, int y, std::span<PathTask> tasks) const {
+void CameraRays::aim(std::span<const int> columns, int y, std::span<const PathTask> tasks,
+                     const RayList& rays) const {
     RandomLanes random;
     random.depth.fill(0);
     random.use.fill(0);
@@ -19,7 +20,7 @@ void CameraRays::aim(std::span<const int> columns, int y, std::span<PathTask> ta
     for (std::size_t begin = 0; begin < tasks.size(); begin += kLanes) {
         const std::size_t count = std::min<std::size_t>(kLanes, tasks.size() - begin);
         for (std::size_t i = 0; i < count; ++i) {
-            const PathSampler& sampler = tasks[begin + i].sample.sampler;
+            const PathSampler& sampler = tasks[begin + i].sampler;
             random.stream[i] = sampler.mixed_stream();
             random.index[i] = sampler.index();
         }
@@ -30,7 +31,8 @@ void CameraRays::aim(std::span<const int> columns, int y, std::span<PathTask> ta
         }
         unit_directions(corner_, right_, down_, u, v, directions, static_cast<int>(count));
         for (std::size_t i = 0; i < count; ++i) {
-            tasks[begin + i].sample.direction = directions.at(static_cast<int>(i));
+            new (&rays[begin + i])
+                RayAndHit(origin_, directions.at(static_cast<int>(i)), kAllParts);
         }
     }
 }

@@ -10,11 +10,13 @@ namespace vitrine {
 class CameraRays {
   public:
     explicit CameraRays(const Camera& camera);
-    /// Fills the directions of tasks that have their samplers: of stream_key(seed, x, y) and index.
+    /// Writes the rays of tasks with samplers of stream_key(seed, x, y) and index.
     /// @param columns of the pixels, per task; @param y their row
-    void aim(std::span<const int> columns, int y, std::span<PathTask> tasks) const;
+    void aim(std::span<const int> columns, int y, std::span<const PathTask> tasks,
+             const RayList& rays) const;
 
   private:
+    Vec3f origin_;
     Vec3f corner_, right_, down_;
 };
 

@@ -210,17 +210,13 @@ DifferentialImage DifferentialRenderer::render(const Camera& camera,
     Image<PixelSums> sums(width, height, PixelSums{});
     Plan plan{Image<int>(width, height, options_.min_samples),
               Image<int>(width, height, options_.min_soft_samples)};
-    constexpr int kBand = 16;
     const auto map_count = static_cast<int>(maps_.size());
     const auto run = [&](const Progress& step, int light_samples) {
-        for (int band = 0; band < height; band += kBand) {
-            const auto rows = static_cast<std::size_t>(std::min(kBand, height - band));
-            parallel_for(rows, 1, [&](std::size_t row) {
-                renderer.add_samples(band + static_cast<int>(row), plan.sharp, plan.soft,
-                                     light_samples, sums);
-            });
-            step.update(static_cast<double>(band + static_cast<int>(rows)) / height, "insert");
-        }
+        parallel_for_blocks(static_cast<std::size_t>(height), 1, step, "insert",
+                            [&](std::size_t row, std::size_t) {
+                                renderer.add_samples(static_cast<int>(row), plan.sharp, plan.soft,
+                                                     light_samples, sums);
+                            });
     };
     run(progress.part(0, 0.3), 1);
     // Twice: the first answer rests on few samples.

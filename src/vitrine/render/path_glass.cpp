@@ -10,26 +10,27 @@ constexpr float kMinSplitShare = 0.01f;
 }  // namespace
 
 void PathTracer::pass_glass(Wave& wave) const {
-    for_each_batch(wave.glass, [&](std::span<const Meeting> hits) { pass_glass(wave, hits); });
+    for_each_batch<Flight*>(wave.glass.items(),
+                            [&](std::span<Flight* const> hits) { pass_glass(wave, hits); });
     wave.glass.clear();
 }
 
-void PathTracer::pass_glass(Wave& wave, std::span<const Meeting> hits) const {
+void PathTracer::pass_glass(Wave& wave, std::span<Flight* const> hits) const {
     PlainLanes& lanes = wave.lanes;
     GlassLanes& bent = wave.bent;
     const int count = static_cast<int>(hits.size());
     for (int i = 0; i < count; ++i) {
-        const Meeting& hit = hits[lane(i)];
-        set_hit(lanes, i, scene_.shape(hit.ray->part), *hit.ray, hit.ray->ray.direction);
-        wave.set_random(i, *hit.state);
+        const auto& [ray, state] = *hits[lane(i)];
+        set_hit(lanes, i, scene_.shape(ray.part), ray, ray.ray.direction);
+        wave.set_random(i, state);
     }
     normalize_facets(lanes, count);
     find_surfaces(lanes, count);
     Lane<std::uint32_t> beyond;
     for (int i = 0; i < count; ++i) {
-        const Meeting& hit = hits[lane(i)];
+        const auto& [ray, state] = *hits[lane(i)];
         const MediumTable::Crossing crossing =
-            wave.media.cross(hit.state->medium, hit.ray->part, lanes.side[lane(i)] > 0);
+            wave.media.cross(state.medium, ray.part, lanes.side[lane(i)] > 0);
         beyond[lane(i)] = crossing.beyond;
         bent.eta[lane(i)] = crossing.eta;
     }
@@ -37,7 +38,7 @@ void PathTracer::pass_glass(Wave& wave, std::span<const Meeting> hits) const {
     lanes.random.of.fill(1);
     lanes.random.use.fill(kBranchUse);
     random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
-    for (int i = 0; i < count; ++i) branch(*hits[lane(i)].state, i, beyond[lane(i)], wave);
+    for (int i = 0; i < count; ++i) branch(hits[lane(i)]->state, i, beyond[lane(i)], wave);
 }
 
 void PathTracer::branch(const State& state, int i, std::uint32_t beyond, Wave& wave) const {

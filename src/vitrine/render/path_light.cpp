@@ -46,10 +46,11 @@ void PathTracer::add_environment(const State& state, const RayAndHit& ray, Sink 
 }
 
 void PathTracer::add_shadows(Wave& wave) const {
-    scene_.occluded(wave.shadow_rays);
-    for (std::size_t i = 0; i < wave.shadows.size(); ++i) {
-        const ShadowRay& shadow = wave.shadows[i];
-        const BareRay& ray = wave.shadow_rays[i];
+    scene_.occluded(wave.shadow_rays.items());
+    const BareRay* next_ray = wave.shadow_rays.begin();
+    const std::span<PathPair> results = wave.results;
+    for (const ShadowRay& shadow : wave.shadows) {
+        const BareRay& ray = *next_ray++;
         std::uint32_t lit = shadow.views;
         if (ray.is_hidden()) {
             if (shadow.views != kAllParts) continue;
@@ -60,7 +61,7 @@ void PathTracer::add_shadows(Wave& wave) const {
                 continue;
             }
         }
-        Sink sink{wave.results[shadow.path]};
+        Sink sink{results[shadow.path]};
         if (lit != shadow.path_views) sink.part();
         sink.add(shadow.is_soft, shadow.layer, shadow.light, lit);
     }
@@ -78,9 +79,8 @@ void PathTracer::Wave::sort_shadows(std::size_t first, int lane_count) {
     std::vector<std::size_t> place(static_cast<std::size_t>(lane_count) + 1, 0);
     for (const int i : shadow_lanes) ++place[static_cast<std::size_t>(i) + 1];
     std::partial_sum(place.begin(), place.end(), place.begin());
-    const auto at = static_cast<std::ptrdiff_t>(first);
-    const std::vector<ShadowRay> old(shadows.begin() + at, shadows.end());
-    const std::vector<BareRay> old_rays(shadow_rays.begin() + at, shadow_rays.end());
+    const std::vector<ShadowRay> old(shadows.begin() + first, shadows.end());
+    const std::vector<BareRay> old_rays(shadow_rays.begin() + first, shadow_rays.end());
     for (std::size_t k = 0; k < old.size(); ++k) {
         const std::size_t to = first + place[static_cast<std::size_t>(shadow_lanes[k])]++;
         shadows[to] = old[k];
@@ -92,7 +92,7 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
                             const Frame& frame, const Vec3f& wo, int light_samples,
                             Wave& wave) const {
     const LightSampler& lights = scene_.lights();
-    const PathSampler& sampler = wave.task(state).sample.sampler;
+    const PathSampler& sampler = wave.task(state).sampler;
     if (lights.count() == 0) return;
     // All lights at the surface seen; one of them, by turns of chance, at those behind it.
     const bool takes_all = !state.has_receiver || lights.count() == 1;
@@ -117,6 +117,7 @@ void PathTracer::add_direct(const State& state, const ShadingPoint& point, const
             if (wi.z() <= 0 || s->direction.dot(point.geometric_normal) <= 0) continue;
             const Rgb value = direct_value(state, bsdf, wo, wi, s->pdf);
             if (!(value > 0).any()) continue;
+            wave.make_shadow_room(1);
             wave.add_shadow(state, state.views, state.layer,
                             state.throughput * value * s->radiance_over_pdf * (scale * wi.z()),
                             origin, s->direction, s->distance);
@@ -223,7 +224,7 @@ void PathTracer::add_exitance(const State& state, const ShadingPoint& point, con
 void PathTracer::add_secondary(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                                Wave& wave) const {
     if (!caustics_ || caustics_->secondary_choice.empty()) return;
-    float u = wave.task(state).sample.sampler.number(state.depth, kSecondaryUse);
+    float u = wave.task(state).sampler.number(state.depth, kSecondaryUse);
     const std::size_t index = caustics_->secondary_choice.sample(u);
     const SecondaryLight& light = caustics_->secondary[index];
     const std::uint32_t views = light.views & state.views;
@@ -241,6 +242,7 @@ void PathTracer::add_secondary(const State& state, const ShadingPoint& point, co
     const auto probability = static_cast<float>(caustics_->secondary_choice.probability(index));
     const float geometry = cos_here * cos_there / (kPif * distance * distance * probability);
     const Layer layer = state.is_layer_fixed ? state.layer : Layer::Diffuse;
+    wave.make_shadow_room(1);
     wave.add_shadow(state, views, layer, state.throughput * value * light.flux * geometry, origin,
                     direction, distance);
 }

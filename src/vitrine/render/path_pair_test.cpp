@@ -27,10 +27,13 @@ Scene world() {
 }
 
 bool same(const PathResult& a, const PathResult& b) {
-    bool is_same = (a.soft.shadow == b.soft.shadow).all() &&
-                   (a.soft.diffuse == b.soft.diffuse).all() &&
-                   a.soft.hit_distance == b.soft.hit_distance && a.first_part == b.first_part;
-    for (std::size_t k = 0; k < kLayerCount; ++k) is_same &= (a.layers[k] == b.layers[k]).all();
+    bool is_same = a.sees_virtual() == b.sees_virtual() && !a.soft() == !b.soft();
+    if (is_same && a.soft()) {
+        is_same = (a.soft()->shadow == b.soft()->shadow).all() &&
+                  (a.soft()->diffuse == b.soft()->diffuse).all() &&
+                  a.soft()->hit_distance == b.soft()->hit_distance;
+    }
+    for (std::size_t k = 0; k < kLayerCount; ++k) is_same &= (a.layer(k) == b.layer(k)).all();
     return is_same;
 }
 
@@ -50,13 +53,13 @@ void expect_two_paths(const Material& material) {
                               -0.25f + 0.0125f * static_cast<float>(y), 0.01f);
             const Vec3f direction = (place - eye).normalized();
             const PathSampler sampler(stream_key(7, unsigned(x), unsigned(y)), 0);
-            const PathTask task{{sampler, direction}, {true, x % 3 == 0 ? 5 : 1}};
-            const PathPair pair = both.trace_both(eye, task);
-            EXPECT_TRUE(same(pair.with(), both.trace(eye, task)));
-            EXPECT_TRUE(same(pair.without(), alone.trace(eye, task)));
+            const PathTask task{sampler, {true, x % 3 == 0 ? 5 : 1}};
+            const PathPair pair = both.trace_both(eye, direction, task);
+            EXPECT_TRUE(same(pair.with(), both.trace(eye, direction, task)));
+            EXPECT_TRUE(same(pair.without(), alone.trace(eye, direction, task)));
             EXPECT_TRUE(pair.is_touched() || same(pair.with(), pair.without()));
             touched += pair.is_touched() ? 1 : 0;
-            hidden += pair.with().first_part == 3 ? 1 : 0;
+            hidden += pair.with().sees_virtual() ? 1 : 0;
             ++count;
         }
     }
@@ -81,17 +84,22 @@ TEST(PathPair, TogetherAsOneByOne) {
     const RenderScene scene(whole);
     const PathTracer tracer(scene, nullptr);
     const Vec3f eye(0.1f, -0.45f, 0.3f);
+    PathTracer::Workspace workspace(tracer);
     std::vector<PathTask> tasks;
+    std::vector<Vec3f> directions;
     for (int k = 0; k < 400; ++k) {
         const Vec3f place(-0.2f + 0.001f * static_cast<float>(k), 0.01f * float(k % 7), 0.05f);
-        tasks.push_back({{PathSampler(stream_key(9, unsigned(k)), 3), (place - eye).normalized()},
-                         {k % 5 > 0, 1 + k % 3}});
+        tasks.push_back({PathSampler(stream_key(9, unsigned(k)), 3), {k % 5 > 0, 1 + k % 3}});
+        directions.push_back((place - eye).normalized());
     }
     std::vector<PathPair> together(tasks.size());
-    PathTracer::Workspace workspace(tracer);
-    tracer.trace_both(eye, tasks, together, workspace);
+    const RayList rays = workspace.start(tasks.size());
     for (std::size_t i = 0; i < tasks.size(); ++i) {
-        const PathPair alone = tracer.trace_both(eye, tasks[i]);
+        rays[i] = RayAndHit(eye, directions[i], kAllParts);
+    }
+    tracer.trace_both(tasks, together, workspace);
+    for (std::size_t i = 0; i < tasks.size(); ++i) {
+        const PathPair alone = tracer.trace_both(eye, directions[i], tasks[i]);
         EXPECT_TRUE(same(together[i].with(), alone.with()));
         EXPECT_TRUE(same(together[i].without(), alone.without()));
         EXPECT_EQ(together[i].is_touched(), alone.is_touched());

@@ -19,6 +19,16 @@ void sample_light(PlainLanes& lanes, const LightSampler& lights, std::size_t lig
     }
 }
 
+ShadingPoint point_at(const PlainLanes& lanes, int i, int part) {
+    ShadingPoint point;
+    point.part = part;
+    point.position = lanes.position.at(i);
+    point.smooth_position = lanes.smooth.at(i);
+    point.geometric_normal = lanes.geometric.at(i);
+    point.shading_normal = lanes.shading.at(i);
+    return point;
+}
+
 }  // namespace
 
 std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
@@ -28,25 +38,33 @@ std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
 }
 
 void PathTracer::shade_plain(Wave& wave) const {
-    for_each_batch(wave.plain, [&](std::span<const Meeting> hits) { shade_plain(wave, hits); });
+    for_each_batch<Flight*>(wave.plain.items(),
+                            [&](std::span<Flight* const> hits) { shade_plain(wave, hits); });
     wave.plain.clear();
 }
 
-void PathTracer::shade_plain(Wave& wave, std::span<const Meeting> hits) const {
+void PathTracer::shade_plain(Wave& wave, std::span<Flight* const> hits) const {
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
+    const int most_bounces = options_.direct_light_only ? 0 : options_.max_diffuse_bounces;
     for (int i = 0; i < count; ++i) {
-        State& state = *hits[lane(i)].state;
-        const RayAndHit& ray = *hits[lane(i)].ray;
+        State& state = hits[lane(i)]->state;
+        const RayAndHit& ray = hits[lane(i)]->ray;
         const PartShape& shape = scene_.shape(ray.part);
         set_hit(lanes, i, shape, ray, ray.ray.direction);
-        lanes.albedo.set(
-            i, shape.has_one_albedo ? shape.albedo : scene_.diffuse_albedo(ray.part, hit_of(ray)));
+        if (shape.has_one_albedo) {
+            lanes.albedo.set(i, shape.albedo);
+        } else {
+            lanes.albedo.set(i, scene_.diffuse_albedo(ray.part, hit_of(ray)));
+        }
         lanes.throughput.set(i, state.throughput);
         wave.set_random(i, state);
-        lanes.can_scatter[lane(i)] =
-            !options_.direct_light_only && state.diffuse_bounces < options_.max_diffuse_bounces ? 1
-                                                                                                : 0;
+        if (varies_light_) {
+            lanes.is_seen[lane(i)] = state.has_receiver ? 0 : 1;
+            lanes.light_samples[lane(i)] = static_cast<std::uint32_t>(
+                state.has_receiver ? 1 : wave.task(state).wish.light_samples);
+        }
+        lanes.can_scatter[lane(i)] = state.diffuse_bounces < most_bounces ? 1 : 0;
         if (!state.is_layer_fixed) {
             state.layer = state.has_receiver ? Layer::Diffuse : Layer::Shadow;
         }
@@ -56,36 +74,39 @@ void PathTracer::shade_plain(Wave& wave, std::span<const Meeting> hits) const {
     find_origins(lanes, scene_.epsilon(), count);
     add_direct(wave, hits);
     Lane<std::uint32_t> is_open = lanes.can_scatter;
-    for (int i = 0; i < count; ++i) {
-        State& state = *hits[lane(i)].state;
-        const DiffuseBsdf bsdf{lanes.albedo.at(i).array()};
-        ShadingPoint point;
-        if (caustics_) {
-            point.part = hits[lane(i)].ray->part;
-            point.position = lanes.position.at(i);
-            point.smooth_position = lanes.smooth.at(i);
-            point.geometric_normal = lanes.geometric.at(i);
-            point.shading_normal = lanes.shading.at(i);
-            add_caustics(state, point, hits[lane(i)].ray->ray.origin, bsdf,
-                         Frame(point.shading_normal), Vec3f(0, 0, 1), wave.sink(state));
-        }
-        if (options_.keeps_soft_apart && is_open[lane(i)] && !state.has_receiver &&
-            !state.is_layer_fixed) {
-            wave.sink(state).each(state.views, [&](PathResult& result) {
-                result.soft.is_present = true;
-                result.soft.albedo = bsdf.albedo;
-                result.soft.position = lanes.position.at(i);
-                result.soft.normal = lanes.shading.at(i);
-            });
-            state.is_soft = wave.task(state).wish.finds_soft;
-            if (!state.is_soft) is_open[lane(i)] = 0;
-        }
-        if (caustics_ && is_open[lane(i)]) add_secondary(state, point, bsdf, wave);
+    for (int i = 0; caustics_ && i < count; ++i) {
+        const State& state = hits[lane(i)]->state;
+        const ShadingPoint point = point_at(lanes, i, hits[lane(i)]->ray.part);
+        add_caustics(state, point, hits[lane(i)]->ray.ray.origin,
+                     DiffuseBsdf{lanes.albedo.at(i).array()}, Frame(point.shading_normal),
+                     Vec3f(0, 0, 1), wave.sink(state));
+    }
+    if (options_.keeps_soft_apart) find_soft(wave, hits, is_open);
+    for (int i = 0; caustics_ && i < count; ++i) {
+        if (!is_open[lane(i)]) continue;
+        add_secondary(hits[lane(i)]->state, point_at(lanes, i, hits[lane(i)]->ray.part),
+                      DiffuseBsdf{lanes.albedo.at(i).array()}, wave);
     }
     scatter(wave, hits, is_open);
 }
 
-void PathTracer::add_direct(Wave& wave, std::span<const Meeting> hits) const {
+void PathTracer::find_soft(Wave& wave, std::span<Flight* const> hits,
+                           Lane<std::uint32_t>& is_open) const {
+    const PlainLanes& lanes = wave.lanes;
+    for (int i = 0; i < static_cast<int>(hits.size()); ++i) {
+        State& state = hits[lane(i)]->state;
+        if (!is_open[lane(i)] || state.has_receiver || state.is_layer_fixed) continue;
+        SoftLight soft;
+        soft.albedo = lanes.albedo.at(i).array();
+        soft.position = lanes.position.at(i);
+        soft.normal = lanes.shading.at(i);
+        wave.sink(state).each(state.views, [&](PathResult& result) { result.set_soft(soft); });
+        state.is_soft = wave.task(state).wish.finds_soft;
+        if (!state.is_soft) is_open[lane(i)] = 0;
+    }
+}
+
+void PathTracer::add_direct(Wave& wave, std::span<Flight* const> hits) const {
     const LightSampler& lights = scene_.lights();
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
@@ -95,23 +116,28 @@ void PathTracer::add_direct(Wave& wave, std::span<const Meeting> hits) const {
     // All lights at the surface seen; one of them, by turns of chance, at those behind it.
     Lane<std::size_t> picked;
     for (int i = 0; has_choice && i < count; ++i) {
-        const State& state = *hits[lane(i)].state;
+        const State& state = hits[lane(i)]->state;
         if (!state.has_receiver) continue;
-        picked[lane(i)] = pick_light(state, wave.task(state).sample.sampler);
+        picked[lane(i)] = pick_light(state, wave.task(state).sampler);
     }
     for (std::size_t light = 0; light < lights.count(); ++light) {
         const bool has_size = lights.needs_position(light);
         std::uint32_t most = 1;
-        for (int i = 0; i < count; ++i) {
-            const State& state = *hits[lane(i)].state;
-            const bool takes_all = !has_choice || !state.has_receiver;
-            const int wish = wave.task(state).wish.light_samples;
-            const auto of = static_cast<std::uint32_t>(has_size && !state.has_receiver ? wish : 1);
-            lanes.random.of[lane(i)] = of;
-            lanes.random.use[lane(i)] = light_use(takes_all ? light : 0);
-            lanes.scale[lane(i)] = (takes_all ? 1.0f : float(lights.count())) / float(of);
-            most = std::max(most, of);
+        if (has_size) {
+            lanes.random.of = lanes.light_samples;
+            most =
+                *std::max_element(lanes.light_samples.begin(), lanes.light_samples.begin() + count);
+        } else {
+            lanes.random.of.fill(1);
         }
+        const auto share = static_cast<float>(lights.count());
+        const std::uint32_t use = light_use(light), use_of_one = light_use(0);
+        for (std::size_t i = 0; i < kLanes; ++i) {
+            const bool takes_all = !has_choice || lanes.is_seen[i] != 0;
+            lanes.random.use[i] = takes_all ? use : use_of_one;
+            lanes.scale[i] = (takes_all ? 1.0f : share) / static_cast<float>(lanes.random.of[i]);
+        }
+        const bool are_in_order = !has_choice && most == 1;
         for (std::uint32_t k = 0; k < most; ++k) {
             if (has_size) random_pairs(lanes.random, k, lanes.u, lanes.v, count);
             if (lane_lights_[light]) {
@@ -120,20 +146,28 @@ void PathTracer::add_direct(Wave& wave, std::span<const Meeting> hits) const {
                 sample_light(lanes, lights, light, count);
             }
             receive_light(lanes, count);
+            wave.make_shadow_room(hits.size());
+            BareRay* shadow_ray = wave.shadow_rays.end();
+            ShadowRay* shadow = wave.shadows.end();
             for (int i = 0; i < count; ++i) {
-                const State& state = *hits[lane(i)].state;
                 if (!(lanes.lit[lane(i)] > 0) || k >= lanes.random.of[lane(i)]) continue;
-                if (has_choice && state.has_receiver && picked[lane(i)] != light) continue;
-                wave.add_shadow(state, state.views, state.layer, lanes.light.at(i).array(),
-                                lanes.origin.at(i), lanes.to_light.at(i), lanes.distance[lane(i)]);
-                wave.shadow_lanes.push_back(i);
+                if (has_choice && !lanes.is_seen[lane(i)] && picked[lane(i)] != light) continue;
+                const auto& [ray, state] = *hits[lane(i)];
+                const float end = short_of(lanes.distance[lane(i)]);
+                new (shadow_ray++)
+                    BareRay(lanes.origin.at(i), lanes.to_light.at(i), end, ray.ray.mask);
+                new (shadow++)
+                    ShadowRay(lanes.light.at(i).array(), end, state, state.views, state.layer);
+                if (!are_in_order) wave.shadow_lanes.push_back(i);
             }
+            wave.shadow_rays.take(shadow_ray);
+            wave.shadows.take(shadow);
         }
     }
     if (wave.shadow_lanes.size() > hits.size()) wave.sort_shadows(first_shadow, count);
 }
 
-void PathTracer::scatter(Wave& wave, std::span<const Meeting> hits,
+void PathTracer::scatter(Wave& wave, std::span<Flight* const> hits,
                          const Lane<std::uint32_t>& is_open) const {
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());
@@ -143,24 +177,28 @@ void PathTracer::scatter(Wave& wave, std::span<const Meeting> hits,
     lanes.random.use.fill(kScatterUse);
     random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
     scatter_lanes(lanes, count);
-    const auto has_receiver = [](const Meeting& hit) { return hit.state->has_receiver; };
+    const auto has_receiver = [](const Flight* hit) { return hit->state.has_receiver; };
     if (std::any_of(hits.begin(), hits.end(), has_receiver)) {
         lanes.random.use.fill(kRouletteUse);
         random_pairs(lanes.random, 0, lanes.u, lanes.v, count);
     }
+    Flight* next = wave.next.end();
     for (int i = 0; i < count; ++i) {
         if (!is_open[lane(i)] || !(lanes.open[lane(i)] > 0)) continue;
-        const State& state = *hits[lane(i)].state;
+        const auto& [ray, state] = *hits[lane(i)];
         Rgb throughput = lanes.throughput.at(i).array();
         if (state.has_receiver) {
             const float survival = survival_of(throughput);
             if (lanes.u[lane(i)] >= survival) continue;
             throughput /= survival;
         }
-        State& next = wave.add(state, lanes.origin.at(i), lanes.scattered.at(i));
-        next.throughput = throughput;
-        next.leave_receiver(Lobe::Diffuse, lanes.scattered_pdf[lane(i)], caustics_ != nullptr);
+        new (next) Flight(lanes.origin.at(i), lanes.scattered.at(i), ray.ray.mask, state);
+        next->state.throughput = throughput;
+        next->state.leave_receiver(Lobe::Diffuse, lanes.scattered_pdf[lane(i)],
+                                   caustics_ != nullptr);
+        ++next;
     }
+    wave.next.take(next);
 }
 
 }  // namespace vitrine

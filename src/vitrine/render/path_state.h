@@ -2,6 +2,7 @@
 // `PathTracer` alone.
 #pragma once
 
+#include "render/batch.h"
 #include "render/glass_lanes.h"
 #include "render/medium_table.h"
 #include "render/path_tracer.h"
@@ -31,8 +32,7 @@ std::size_t lane(T i) {
 
 /// Calls `body(items)` for as many at a time as there are lanes.
 template <typename Item, typename Body>
-void for_each_batch(const std::vector<Item>& items, const Body& body) {
-    const std::span<const Item> all(items);
+void for_each_batch(std::span<const Item> all, const Body& body) {
     for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
         body(all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
     }
@@ -49,19 +49,23 @@ struct PathTracer::State {
     std::int16_t specular_bounces = 0;
     std::uint8_t views = kVirtualParts;  // scenes whose path this is
     Layer layer = Layer::Shadow;
-    bool has_receiver = false;  // left a surface that photons are stored on: the one seen, or more
-    /// Light met now is known from the photons of the last receiver.
-    bool is_covered = false;
-    bool is_layer_fixed = false;      // seen by way of a reflection or refraction
-    bool is_from_first = false;       // left the surface seen by its diffuse lobe
-    bool is_diffuse_segment = false;  // straight from a receiver's diffuse lobe
-    bool is_soft = false;             // what comes now is soft light of the surface seen
+    // Left a surface that photons are stored on: the one seen, or more.
+    bool has_receiver : 1 = false;
+    // Light met now is known from the photons of the last receiver.
+    bool is_covered : 1 = false;
+    bool is_layer_fixed : 1 = false;      // seen by way of a reflection or refraction
+    bool is_from_first : 1 = false;       // left the surface seen by its diffuse lobe
+    bool is_diffuse_segment : 1 = false;  // straight from a receiver's diffuse lobe
+    bool is_soft : 1 = false;             // what comes now is soft light of the surface seen
 
     /// Goes on from a receiver by one of its lobes.
     void leave_receiver(Lobe lobe, float its_pdf, bool has_photons);
     /// Goes on from a mirror or a glass surface; the first of them makes the layer.
     void pass_specular(Layer seen_by, bool has_photons);
 };
+
+/// How far the way to a light at a distance must be free.
+inline float short_of(float distance) { return distance * (1 - 1e-4f); }
 
 /// Share of the paths that go on from a receiver behind the one seen; the others are left to
 /// chance.
@@ -85,10 +89,10 @@ struct PathTracer::Sink {
     }
     void add(bool is_soft, Layer layer, const Rgb& radiance, std::uint32_t views) {
         each(views, [&](PathResult& result) {
-            if (!is_soft) {
-                result.layers[static_cast<std::size_t>(layer)] += radiance;
+            if (is_soft) {
+                result.add_soft(layer, radiance);
             } else {
-                (layer == Layer::Shadow ? result.soft.shadow : result.soft.diffuse) += radiance;
+                result.add(layer, radiance);
             }
         });
     }
@@ -104,6 +108,17 @@ struct PathTracer::Sink {
 
 /// Light that arrives if nothing is in its way.
 struct PathTracer::ShadowRay {
+    ShadowRay() = default;
+    /// @param its_views scenes, of those of the path, in which the light is there
+    ShadowRay(const Rgb& its_light, float its_distance, const State& state, std::uint32_t its_views,
+              Layer its_layer)
+        : light(its_light),
+          distance(its_distance),
+          path(state.path),
+          path_views(state.views),
+          views(static_cast<std::uint8_t>(its_views)),
+          layer(its_layer),
+          is_soft(state.is_soft) {}
     Rgb light;
     float distance;  // up to which its way must be free
     std::uint32_t path;
@@ -113,10 +128,13 @@ struct PathTracer::ShadowRay {
     bool is_soft;
 };
 
-/// A path and the surface it met.
-struct PathTracer::Meeting {
-    State* state;
-    const RayAndHit* ray;
+/// A path under way: its ray, then answered, and the rest.
+struct alignas(64) PathTracer::Flight {
+    Flight() = default;
+    Flight(const Vec3f& origin, const Vec3f& direction, std::uint32_t mask, const State& its_state)
+        : ray(origin, direction, mask), state(its_state) {}
+    RayAndHit ray;
+    State state;
 };
 
 /// Paths that go on side by side, one surface at a time: rays are sent one after the other, with
@@ -130,27 +148,26 @@ struct PathTracer::Wave {
     std::span<const PathTask> tasks;
     std::span<PathPair> results;
     MediumTable media;
-    std::vector<RayAndHit> rays;  // under way, then answered
-    std::vector<State> states;    // of `rays`
-    std::vector<RayAndHit> next_rays;
-    std::vector<State> next;  // of `next_rays`
+    Batch<Flight> flights, next;
     // Met in the scene without virtual parts alone, by paths that were those of both.
-    std::vector<State> parted;
-    std::vector<RayAndHit> parted_rays;
-    // Surfaces that wait, met by the states above, in the order in which they came.
-    std::vector<Meeting> plain, glass;
+    Batch<Flight> parted;
+    // At surfaces that wait, in the order in which they came.
+    Batch<Flight*> plain, glass;
     PlainLanes lanes = {};
     GlassLanes bent = {};
-    std::vector<BareRay> shadow_rays;
-    std::vector<ShadowRay> shadows;  // of `shadow_rays`
-    std::vector<int> shadow_lanes;   // of the last shadow rays
+    Batch<BareRay> shadow_rays;
+    Batch<ShadowRay> shadows;       // of `shadow_rays`
+    std::vector<int> shadow_lanes;  // of the last shadow rays
 
     const PathTask& task(const State& state) const { return tasks[state.path]; }
     Sink sink(const State& state) const { return {results[state.path]}; }
     /// The path's random numbers at its vertex, into a lane.
     void set_random(int i, const State& state);
-    /// Surfaces met point into what was parted: room for all of them.
-    void reserve_parted(std::size_t count);
+    /// Room for all that `count` paths under way may meet and for where they may go on: surfaces
+    /// met point into it.
+    void make_room(std::size_t count, bool may_part);
+    /// Room for more shadow rays.
+    void make_shadow_room(std::size_t count);
     /// The next rays become those under way.
     void go_on();
     /// A path that goes on.
@@ -192,39 +209,42 @@ inline void PathTracer::State::pass_specular(Layer seen_by, bool has_photons) {
 }
 
 inline void PathTracer::Wave::set_random(int i, const State& state) {
-    const PathSampler& sampler = task(state).sample.sampler;
+    const PathSampler& sampler = task(state).sampler;
     lanes.random.stream[lane(i)] = sampler.mixed_stream();
     lanes.random.index[lane(i)] = sampler.index();
     lanes.random.depth[lane(i)] = static_cast<std::uint32_t>(state.depth);
 }
 
-inline void PathTracer::Wave::reserve_parted(std::size_t count) {
+inline void PathTracer::Wave::make_room(std::size_t count, bool may_part) {
     parted.clear();
-    parted_rays.clear();
-    parted.reserve(count);
-    parted_rays.reserve(count);
+    parted.make_room(may_part ? count : 0);
+    const std::size_t most = may_part ? 2 * count : count;
+    plain.make_room(most);
+    glass.make_room(most);
+    next.make_room(2 * most);  // both branches at glass
+}
+
+inline void PathTracer::Wave::make_shadow_room(std::size_t count) {
+    shadows.make_room(count);
+    shadow_rays.make_room(count);
 }
 
 inline void PathTracer::Wave::go_on() {
-    states.swap(next);
-    rays.swap(next_rays);
+    flights.swap(next);
     next.clear();
-    next_rays.clear();
 }
 
 inline PathTracer::State& PathTracer::Wave::add(const State& state, const Vec3f& origin,
                                                 const Vec3f& direction) {
-    next_rays.emplace_back(origin, direction, mask_of(state.views));
-    return next.emplace_back(state);
+    return next.add(origin, direction, mask_of(state.views), state).state;
 }
 
 inline void PathTracer::Wave::add_shadow(const State& state, std::uint32_t views, Layer layer,
                                          const Rgb& light, const Vec3f& origin,
                                          const Vec3f& direction, float distance) {
-    const float end = distance * (1 - 1e-4f);
-    shadow_rays.emplace_back(origin, direction, end, mask_of(views));
-    shadows.push_back({light, end, state.path, state.views, static_cast<std::uint8_t>(views), layer,
-                       state.is_soft});
+    const float end = short_of(distance);
+    shadow_rays.add(origin, direction, end, mask_of(views));
+    shadows.add(light, end, state, views, layer);
 }
 
 }  // namespace vitrine

@@ -1,9 +1,21 @@
 #include "render/path_tracer.h"
 
+#include "base/error.h"
 #include "render/interface.h"
 #include "render/path_state.h"
 
 namespace vitrine {
+namespace {
+
+/// Whether the place on some light is chosen anew for every shadow ray.
+bool has_places(const LightSampler& lights) {
+    for (std::size_t i = 0; i < lights.count(); ++i) {
+        if (lights.needs_position(i)) return true;
+    }
+    return false;
+}
+
+}  // namespace
 
 PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, PathOptions options,
                        const TranslucentLight* translucent)
@@ -13,98 +25,106 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
       translucent_(translucent),
       has_virtual_(scene.has_virtual()),
       has_lamps_(!scene.lights().lamps().empty()),
+      varies_light_(scene.lights().count() > 1 || has_places(scene.lights())),
       has_background_(!scene.lights().environments().empty() ||
                       (scene.lights().ambient() != 0).any()),
       lane_lights_(lane_lights(scene.lights())) {}
 
-PathResult PathTracer::trace(const Vec3f& origin, const PathTask& task) const {
+PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
+                             const PathTask& task) const {
     PathPair pair;
     Wave wave(scene_, std::span(&task, 1), std::span(&pair, 1));
-    start(origin, kVirtualParts, wave);
+    wave.flights.make_room(1);
+    wave.flights.add(origin, direction, kAllParts, State());
+    start(kVirtualParts, wave);
     return pair.with_;
 }
 
-PathPair PathTracer::trace_both(const Vec3f& origin, const PathTask& task) const {
+PathPair PathTracer::trace_both(const Vec3f& origin, const Vec3f& direction,
+                                const PathTask& task) const {
     PathPair pair;
     Workspace workspace(*this);
-    trace_both(origin, std::span(&task, 1), std::span(&pair, 1), workspace);
+    workspace.start(1)[0] = RayAndHit(origin, direction, kAllParts);
+    trace_both(std::span(&task, 1), std::span(&pair, 1), workspace);
     return pair;
 }
 
 PathTracer::Workspace::Workspace(const PathTracer& tracer)
     : wave_(std::make_unique<Wave>(tracer.scene_)) {}
 PathTracer::Workspace::~Workspace() = default;
+RayList PathTracer::Workspace::start(std::size_t count) {
+    wave_->flights.clear();
+    wave_->flights.make_room(count);
+    wave_->flights.take(wave_->flights.begin() + count);
+    return RayList::of(wave_->flights.items());
+}
 
-void PathTracer::trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
-                            std::span<PathPair> results, Workspace& workspace) const {
+void PathTracer::trace_both(std::span<const PathTask> tasks, std::span<PathPair> results,
+                            Workspace& workspace) const {
     Wave& wave = *workspace.wave_;
     wave.tasks = tasks;
     wave.results = results;
-    start(origin, has_virtual_ ? kAllParts : kVirtualParts, wave);
+    start(has_virtual_ ? kAllParts : kVirtualParts, wave);
 }
 
-void PathTracer::start(const Vec3f& origin, std::uint32_t views, Wave& wave) const {
-    const std::size_t count = wave.tasks.size();
-    wave.rays.reserve(count);
-    for (std::size_t i = 0; i < count; ++i) {
-        wave.results[i].clear();
-        wave.rays.emplace_back(origin, wave.tasks[i].sample.direction, mask_of(views));
-    }
-    // Neighbours' camera rays run side by side, which Embree's packets are made for.
-    scene_.closest(wave.rays, true);
+void PathTracer::start(std::uint32_t views, Wave& wave) const {
+    VITRINE_CHECK_EQ(wave.flights.size(), wave.tasks.size());
     State first;
     first.views = static_cast<std::uint8_t>(views);
-    prefetch(wave);
-    wave.states.reserve(count);  // surfaces met point into it
-    wave.reserve_parted(has_virtual_ ? count : 0);
-    for (std::size_t i = 0; i < count; ++i) {
-        if (!wave.rays[i].is_hit() && !has_lamps_ && !has_background_) continue;
-        State& state = wave.states.emplace_back(first);
-        state.path = static_cast<std::uint32_t>(i);
-        meet(state, wave.rays[i], wave);
+    for (Flight& flight : wave.flights) {
+        flight.state = first;
+        ++first.path;
     }
-    finish(wave);
+    for (PathPair& result : wave.results) result.clear();
+    // Neighbours' camera rays run side by side, which Embree's packets are made for.
+    finish(wave, true);
 }
 
-void PathTracer::finish(Wave& wave) const {
-    for (;;) {
+void PathTracer::finish(Wave& wave, bool are_alike) const {
+    for (; wave.flights.size() > 0; are_alike = false) {
+        scene_.closest(RayList::of(wave.flights.items()), are_alike);
+        prefetch(wave);
+        wave.make_room(wave.flights.size(), has_virtual_);
+        for (Flight& flight : wave.flights) {
+            if (flight.ray.is_hit() || has_lamps_ || has_background_) meet(flight, wave);
+        }
         shade_plain(wave);
         pass_glass(wave);
         add_shadows(wave);
         wave.go_on();
-        const std::size_t count = wave.states.size();
-        if (count == 0) return;
-        scene_.closest(wave.rays, false);
-        prefetch(wave);
-        wave.reserve_parted(has_virtual_ ? count : 0);
-        for (std::size_t i = 0; i < count; ++i) meet(wave.states[i], wave.rays[i], wave);
     }
 }
 
 void PathTracer::prefetch(const Wave& wave) const {
-    for (const RayAndHit& ray : wave.rays) scene_.prefetch_triangle(ray);
-    for (const RayAndHit& ray : wave.rays) scene_.prefetch_vertices(ray);
+    if (!scene_.is_large()) return;
+    for (const Flight& flight : wave.flights) scene_.prefetch_triangle(flight.ray);
+    for (const Flight& flight : wave.flights) scene_.prefetch_vertices(flight.ray);
 }
 
-void PathTracer::meet(State& state, const RayAndHit& ray, Wave& wave) const {
-    if (state.views != kAllParts || !ray.is_hit() || !scene_.is_virtual(ray.part)) {
-        step(state, ray, wave);
-        return;
+void PathTracer::meet(Flight& flight, Wave& wave) const {
+    const auto& [ray, state] = flight;
+    if (state.views == kAllParts && ray.is_hit() && scene_.is_virtual(ray.part)) {
+        part(flight, wave);
+    } else {
+        step(flight, wave);
     }
+}
+
+void PathTracer::part(Flight& flight, Wave& wave) const {
+    const auto& [ray, state] = flight;
     wave.sink(state).part();
-    State& real = wave.parted.emplace_back(state);
-    real.views = kRealParts;
-    state.views = kVirtualParts;
-    step(state, ray, wave);
-    RayAndHit& behind =
-        wave.parted_rays.emplace_back(ray.ray.origin, ray.ray.direction, mask_of(real.views));
-    scene_.closest(std::span(&behind, 1), false);
-    step(real, behind, wave);
+    Flight& behind = wave.parted.add(ray.ray.origin, ray.ray.direction, mask_of(kRealParts), state);
+    behind.state.views = kRealParts;
+    flight.state.views = kVirtualParts;
+    step(flight, wave);
+    scene_.closest(std::span(&behind.ray, 1), false);
+    step(behind, wave);
 }
 
 void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const PathTask> tasks,
                           std::uint32_t views, std::span<PathPair> results) const {
     Wave wave(scene_, tasks, results);
+    wave.make_room(tasks.size(), has_virtual_);
     const bool is_in_one = views == kVirtualParts || views == kRealParts;
     const Bsdf bsdf = EnteringBsdf{eta};
     const Frame frame(point.shading_normal);
@@ -122,12 +142,15 @@ void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const 
         add_secondary(state, point, bsdf, wave);
         scatter(state, point, bsdf, frame, wo, wave);
     }
-    finish(wave);
+    add_shadows(wave);
+    wave.go_on();
+    finish(wave, false);
 }
 
-void PathTracer::step(State& state, const RayAndHit& ray, Wave& wave) const {
+void PathTracer::step(Flight& flight, Wave& wave) const {
+    auto& [ray, state] = flight;
     Sink sink = wave.sink(state);
-    if (wave.media.absorbs(state.medium)) {
+    if (state.medium != 0 && wave.media.absorbs(state.medium)) {
         state.throughput *= scene_.transmittance(wave.media.media(state.medium), ray.distance());
     }
     if (has_lamps_) add_emission(state, ray, sink);
@@ -135,25 +158,29 @@ void PathTracer::step(State& state, const RayAndHit& ray, Wave& wave) const {
         if (has_background_) add_environment(state, ray, sink);
         return;
     }
-    if (state.depth == 0) {
-        sink.each(state.views, [&](PathResult& result) { result.first_part = ray.part; });
+    if (has_virtual_ && state.depth == 0 && scene_.is_virtual(ray.part)) {
+        sink.each(state.views, [&](PathResult& result) { result.set_sees_virtual(); });
     }
     if (state.is_soft) {
-        sink.each(state.views, [&](PathResult& result) {
-            if (result.soft.hit_distance == 0) result.soft.hit_distance = ray.distance();
-        });
+        sink.each(state.views, [&](PathResult& result) { result.meet_soft(ray.distance()); });
     }
     ++state.depth;
-    if (scene_.shape(ray.part).is_diffuse) {
-        wave.plain.push_back({&state, &ray});
+    const PartShape& shape = scene_.shape(ray.part);
+    if (shape.is_diffuse) {
+        wave.plain.add(&flight);
         return;
     }
-    if (scene_.dielectric(ray.part)) {
+    if (shape.is_dielectric) {
         if (++state.specular_bounces <= options_.max_specular_bounces) {
-            wave.glass.push_back({&state, &ray});
+            wave.glass.add(&flight);
         }
         return;
     }
+    scatter_alone(state, ray, wave);
+}
+
+void PathTracer::scatter_alone(State& state, const RayAndHit& ray, Wave& wave) const {
+    Sink sink = wave.sink(state);
     const Hit hit = hit_of(ray);
     const ShadingPoint point = scene_.surface(hit, ray.ray.direction);
     const Bsdf bsdf = scene_.bsdf(point, hit);
@@ -180,7 +207,7 @@ void PathTracer::step(State& state, const RayAndHit& ray, Wave& wave) const {
 
 void PathTracer::scatter(const State& state, const ShadingPoint& point, const Bsdf& bsdf,
                          const Frame& frame, const Vec3f& wo, Wave& wave) const {
-    const PathSampler& sampler = wave.task(state).sample.sampler;
+    const PathSampler& sampler = wave.task(state).sampler;
     const bool has_choice = !std::holds_alternative<DiffuseBsdf>(bsdf);
     const BsdfSample s = sample(bsdf, wo, sampler.pair(state.depth, kScatterUse),
                                 has_choice ? sampler.number(state.depth, kLobeUse) : 0.0f);

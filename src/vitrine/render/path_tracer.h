@@ -6,6 +6,7 @@
 // photons, or found by paths that happen on a light with size.
 #pragma once
 
+#include "render/batch.h"
 #include "render/caustic_maps.h"
 #include "render/plain_lanes.h"
 #include "render/render_scene.h"
@@ -13,6 +14,7 @@
 #include "render/translucent_light.h"
 
 #include <array>
+#include <bit>
 #include <span>
 
 namespace vitrine {
@@ -38,7 +40,6 @@ struct PathOptions {
 /// What other surfaces and the environment send to a plain diffuse surface that is seen without
 /// glass or mirrors in between: varies slowly along it, and is known apart from its albedo.
 struct SoftLight {
-    bool is_present = false;    ///< such a surface is seen
     Rgb shadow = Rgb::Zero();   ///< reflected radiance, of Layer::Shadow: the environment's
     Rgb diffuse = Rgb::Zero();  ///< of Layer::Diffuse
     Rgb albedo = Rgb::Zero();
@@ -47,25 +48,68 @@ struct SoftLight {
     float hit_distance = 0;  ///< to the surface that sends the light; 0: none met
 };
 
-struct PathResult {
-    std::array<Rgb, kLayerCount> layers;  ///< without the soft light
-    SoftLight soft;
-    int first_part = -1;  ///< met by the camera ray itself; -1: none
-    PathResult() { layers.fill(Rgb::Zero()); }
-    /// Without any light; where soft light was found stays, and counts no longer.
+/// What one path brings. Of those that bring little, little memory is touched.
+class PathResult {
+  public:
+    /// Without any light.
     void clear() {
-        layers.fill(Rgb::Zero());
-        soft.is_present = false;
-        soft.shadow = soft.diffuse = Rgb::Zero();
-        soft.hit_distance = 0;
-        first_part = -1;
+        filled_ = 0;
+        has_soft_ = false;
+        sees_virtual_ = false;
     }
-    Rgb sharp() const { return layers[0] + layers[1] + layers[2] + layers[3] + layers[4]; }
-    Rgb total() const { return sharp() + soft.shadow + soft.diffuse; }
+    void set_sees_virtual() { sees_virtual_ = true; }
+    void set_soft(const SoftLight& soft) {
+        has_soft_ = true;
+        soft_ = soft;
+    }
+    void add(Layer layer, const Rgb& radiance) {
+        const unsigned bit = 1u << static_cast<unsigned>(layer);
+        Rgb& sum = layers_[static_cast<std::size_t>(layer)];
+        if (filled_ & bit) {
+            sum += radiance;
+        } else {
+            sum = radiance;
+            filled_ = static_cast<std::uint8_t>(filled_ | bit);
+        }
+    }
+    /// Of the surface seen, which `set_soft` was told of.
+    void add_soft(Layer layer, const Rgb& radiance) {
+        (layer == Layer::Shadow ? soft_.shadow : soft_.diffuse) += radiance;
+    }
+    /// @param distance to a surface that sends soft light; the first counts
+    void meet_soft(float distance) {
+        if (soft_.hit_distance == 0) soft_.hit_distance = distance;
+    }
+
+    /// The camera's ray itself meets a virtual part.
+    bool sees_virtual() const { return sees_virtual_; }
+    /// Null where there is none.
+    const SoftLight* soft() const { return has_soft_ ? &soft_ : nullptr; }
+    Rgb soft_sum() const {
+        return has_soft_ ? Rgb(soft_.shadow + soft_.diffuse) : Rgb(Rgb::Zero());
+    }
+    /// Radiance without the soft light.
+    Rgb layer(std::size_t k) const { return filled_ >> k & 1u ? layers_[k] : Rgb(Rgb::Zero()); }
+    bool is_dark() const { return filled_ == 0; }
+    Rgb sharp() const {
+        Rgb sum = Rgb::Zero();
+        for (unsigned left = filled_; left != 0; left &= left - 1) {
+            sum += layers_[static_cast<std::size_t>(std::countr_zero(left))];
+        }
+        return sum;
+    }
+    Rgb total() const { return sharp() + soft_sum(); }
+
+  private:
+    std::uint8_t filled_ = 0;  // a bit per layer: the others hold nothing
+    bool has_soft_ = false;
+    bool sees_virtual_ = false;
+    std::array<Rgb, kLayerCount> layers_;
+    SoftLight soft_;
 };
 
 /// One path in the scene with virtual parts and in the one without.
-class PathPair {
+class alignas(64) PathPair {
   public:
     const PathResult& with() const { return with_; }
     const PathResult& without() const { return is_touched_ ? without_ : with_; }
@@ -83,21 +127,15 @@ class PathPair {
     PathResult with_, without_;  // the second counts from where they part
 };
 
-/// A ray from the camera and the path's random numbers.
-struct CameraSample {
-    PathSampler sampler;
-    Vec3f direction = Vec3f::Zero();
-};
-
 /// What one path is asked for.
 struct PathWish {
     bool finds_soft = true;  ///< false: leaves the soft light out, for a fraction of the cost
     int light_samples = 1;   ///< shadow rays to each lamp with size, from the surface seen
 };
 
-/// One path from the camera.
+/// One path from the camera, beside its ray.
 struct PathTask {
-    CameraSample sample;
+    PathSampler sampler;
     PathWish wish;
 };
 
@@ -112,16 +150,17 @@ class PathTracer {
                const TranslucentLight* translucent = nullptr);
 
     /// In the scene with its virtual parts, if it has any.
-    PathResult trace(const Vec3f& origin, const PathTask& task) const;
+    PathResult trace(const Vec3f& origin, const Vec3f& direction, const PathTask& task) const;
 
     /// In the scene with its virtual parts and in the one without. What both have in common is
     /// traced once: they part where a ray meets a virtual part, and go on with the same numbers.
-    PathPair trace_both(const Vec3f& origin, const PathTask& task) const;
+    PathPair trace_both(const Vec3f& origin, const Vec3f& direction, const PathTask& task) const;
     /// Memory of paths under way, which serves many calls; one per thread.
     class Workspace;
     /// Of many paths: a few hundred together cost about half of what they cost one by one.
-    void trace_both(const Vec3f& origin, std::span<const PathTask> tasks,
-                    std::span<PathPair> results, Workspace& workspace) const;
+    /// @param workspace with the paths' rays from the camera, which are gone afterwards
+    void trace_both(std::span<const PathTask> tasks, std::span<PathPair> results,
+                    Workspace& workspace) const;
 
     /// Irradiance / pi that enters a translucent body at `point` along each of some paths. Photons
     /// that land on it are left out: they are known one by one.
@@ -136,29 +175,37 @@ class PathTracer {
     struct Sink;
     struct ShadowRay;
     struct Wave;
-    struct Meeting;
-    void start(const Vec3f& origin, std::uint32_t views, Wave& wave) const;
+    struct Flight;
+    void start(std::uint32_t views, Wave& wave) const;
     /// Follows all paths of the wave to their ends.
-    void finish(Wave& wave) const;
+    /// @param are_alike rays next to each other
+    void finish(Wave& wave, bool are_alike) const;
     /// Asks memory for the surfaces that the wave's rays have met.
     void prefetch(const Wave& wave) const;
     /// What the path's ray has met, in one scene or in both.
-    void meet(State& state, const RayAndHit& ray, Wave& wave) const;
+    void meet(Flight& flight, Wave& wave) const;
+    /// What it has met differs between the scenes.
+    void part(Flight& flight, Wave& wave) const;
     /// What that brings; what goes on from there is added to the wave's next. Plain surfaces
     /// and glass wait.
-    void step(State& state, const RayAndHit& ray, Wave& wave) const;
+    void step(Flight& flight, Wave& wave) const;
+    /// At surfaces of other kinds.
+    void scatter_alone(State& state, const RayAndHit& ray, Wave& wave) const;
     void pass_mirror(const State& state, const ShadingPoint& point, const RayAndHit& ray,
                      const Rgb& reflectance, Wave& wave) const;
     /// Where paths go on from the glass that the wave has met.
     void pass_glass(Wave& wave) const;
-    void pass_glass(Wave& wave, std::span<const Meeting> hits) const;
+    void pass_glass(Wave& wave, std::span<Flight* const> hits) const;
     /// @param i lane of the surface; @param beyond medium there
     void branch(const State& state, int i, std::uint32_t beyond, Wave& wave) const;
     /// What the plain diffuse surfaces bring that the wave has met, many side by side.
     void shade_plain(Wave& wave) const;
-    void shade_plain(Wave& wave, std::span<const Meeting> hits) const;
-    void add_direct(Wave& wave, std::span<const Meeting> hits) const;
-    void scatter(Wave& wave, std::span<const Meeting> hits,
+    void shade_plain(Wave& wave, std::span<Flight* const> hits) const;
+    void add_direct(Wave& wave, std::span<Flight* const> hits) const;
+    /// Where soft light is apart: says what surfaces it is of.
+    /// @param is_open lanes that go on; those that are not asked for it do not
+    void find_soft(Wave& wave, std::span<Flight* const> hits, Lane<std::uint32_t>& is_open) const;
+    void scatter(Wave& wave, std::span<Flight* const> hits,
                  const Lane<std::uint32_t>& is_open) const;
     void add_emission(const State& state, const RayAndHit& ray, Sink sink) const;
     void add_environment(const State& state, const RayAndHit& ray, Sink sink) const;
@@ -185,8 +232,9 @@ class PathTracer {
     PathOptions options_;
     const TranslucentLight* translucent_;
     bool has_virtual_;
-    bool has_lamps_;                                     // that a ray can meet
-    bool has_background_;                                // that a ray can meet, behind all parts
+    bool has_lamps_;       // that a ray can meet
+    bool varies_light_;    // several lights, or one with places to choose from
+    bool has_background_;  // that a ray can meet, behind all parts
     std::vector<std::optional<LaneLight>> lane_lights_;  // discs and points
 };
 
@@ -195,6 +243,8 @@ class PathTracer::Workspace {
     /// For this tracer and others of the same scene.
     explicit Workspace(const PathTracer& tracer);
     ~Workspace();
+    /// Takes the next paths' rays from the camera, to be written, as they would see all parts.
+    RayList start(std::size_t count);
 
   private:
     friend class PathTracer;

@@ -51,7 +51,7 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
     for (int depth = 0; !group.flights_.rays.empty(); ++depth) {
         // The first surfaces are met side by side; behind them neighbours have parted, and Embree's
         // packets of such rays cost more than the rays one by one.
-        scene_.closest(group.flights_.rays, depth < kTogether);
+        scene_.closest(std::span(group.flights_.rays), depth < kTogether);
         sort_out(target, depth, group);
         group.next_.clear();
         group.faint_.clear();

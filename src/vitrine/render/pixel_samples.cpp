@@ -1,7 +1,5 @@
 #include "render/pixel_samples.h"
 
-#include "render/path_group.h"
-
 namespace vitrine {
 namespace {
 
@@ -14,18 +12,22 @@ constexpr int kBlock = 2;
 }  // namespace
 
 void SoftSums::add(const PathResult& path, bool finds_soft) {
-    if (!path.soft.is_present) return;
+    const SoftLight* soft = path.soft();
+    if (!soft) return;
     ++seen;
-    albedo += path.soft.albedo;
-    position += path.soft.position;
-    normal += path.soft.normal;
+    albedo += soft->albedo;
+    position += soft->position;
+    normal += soft->normal;
     if (!finds_soft) return;
     ++count;
-    with += (path.soft.shadow + path.soft.diffuse) / path.soft.albedo.max(kLeastAlbedo);
-    if (path.soft.hit_distance > 0) {
-        ++hits;
-        inverse_square += 1 / (path.soft.hit_distance * path.soft.hit_distance);
-    }
+    with += (soft->shadow + soft->diffuse) / soft->albedo.max(kLeastAlbedo);
+    add_hit(soft->hit_distance);
+}
+
+void SoftSums::add_hit(float distance) {
+    if (distance <= 0) return;
+    ++hits;
+    inverse_square += 1 / (distance * distance);
 }
 
 SoftPixel SoftSums::mean() const {
@@ -56,7 +58,7 @@ float PixelSums::sharp_variance() const {
 PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMaps>& maps,
                            const TranslucentLight& translucent, const Camera& camera,
                            const PathOptions& paths, std::uint64_t seed)
-    : scene_(scene), rays_(camera), origin_(camera.centre_in_world().cast<float>()), seed_(seed) {
+    : rays_(camera), seed_(seed) {
     for (const CausticMaps& m : maps) {
         tracers_.emplace_back(scene, m.empty() ? nullptr : &m, paths, &translucent);
     }
@@ -64,9 +66,11 @@ PixelSampler::PixelSampler(const RenderScene& scene, const std::vector<CausticMa
 
 void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>& soft_target,
                                int light_samples, Image<PixelSums>& sums) const {
-    PathGroup group(
-        tracers_, rays_, origin_, y,
-        [&](int x, const PathWish& wish, const PathPair& pair) { add(pair, wish, sums(x, y)); });
+    const auto use = [&](int x, const PathWish& wish, const PathPair& pair) {
+        add(pair, wish, sums(x, y));
+    };
+    const auto group = groups_.lend([&] { return std::make_unique<PathGroup>(tracers_, rays_); });
+    PathRow row(*group, y, use);
     for (int x = 0; x < sums.width(); ++x) {
         const PixelSums& pixel = sums(x, y);
         const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
@@ -76,33 +80,30 @@ void PixelSampler::add_samples(int y, const Image<int>& target, const Image<int>
             // Neighbours begin with different passes: soft light is averaged over them.
             const auto turn = static_cast<std::size_t>(k + x + 2 * y);
             const bool finds_soft = soft_left-- > 0;
-            group.add(turn % tracers_.size(), x, sampler.at(static_cast<std::uint32_t>(k)),
-                      {finds_soft, finds_soft ? 1 : light_samples});
+            row.add(turn % tracers_.size(), x, sampler.at(static_cast<std::uint32_t>(k)),
+                    {finds_soft, finds_soft ? 1 : light_samples});
         }
     }
-    group.finish();
+    row.finish();
 }
 
 void PixelSampler::add(const PathPair& pair, const PathWish& wish, PixelSums& sums) const {
     const PathResult &with = pair.with(), &without = pair.without();
-    const bool is_covered = with.first_part >= 0 && scene_.is_virtual(with.first_part);
+    const bool is_covered = with.sees_virtual();
     const Rgb sharp = with.sharp();
     sums.with += sharp;
     sums.without += without.sharp();
     SoftSums& soft = is_covered ? sums.soft_virtual : sums.soft_real;
-    const Rgb soft_with = with.soft.shadow + with.soft.diffuse;
-    const Rgb soft_without = without.soft.shadow + without.soft.diffuse;
+    const Rgb soft_with = with.soft_sum(), soft_without = without.soft_sum();
     soft.add(with, wish.finds_soft);
-    if (wish.finds_soft && with.soft.is_present && pair.is_touched()) {
+    const SoftLight *here = with.soft(), *there = without.soft();
+    if (wish.finds_soft && here && there && pair.is_touched()) {
         if (!is_covered) {
-            const Rgb scale = 1.0f / with.soft.albedo.max(kLeastAlbedo);
-            soft.shadow += scale * (with.soft.shadow - without.soft.shadow);
-            soft.diffuse += scale * (with.soft.diffuse - without.soft.diffuse);
+            const Rgb scale = 1.0f / here->albedo.max(kLeastAlbedo);
+            soft.shadow += scale * (here->shadow - there->shadow);
+            soft.diffuse += scale * (here->diffuse - there->diffuse);
         }
-        if (without.soft.hit_distance > 0) {
-            ++soft.hits;
-            soft.inverse_square += 1 / (without.soft.hit_distance * without.soft.hit_distance);
-        }
+        soft.add_hit(there->hit_distance);
     }
     if (is_covered) {
         ++sums.covered;
@@ -110,7 +111,7 @@ void PixelSampler::add(const PathPair& pair, const PathWish& wish, PixelSums& su
         sums.hidden += soft_without;
     } else if (pair.is_touched()) {
         for (std::size_t k = 0; k < kLayerCount; ++k) {
-            sums.delta[k] += with.layers[k] - without.layers[k];
+            sums.delta[k] += with.layer(k) - without.layer(k);
         }
     }
     const float change = luminance(Rgb(sharp - without.sharp()));

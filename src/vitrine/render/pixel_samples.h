@@ -2,7 +2,7 @@
 // and what they sum to.
 #pragma once
 
-#include "render/camera_rays.h"
+#include "render/path_group.h"
 #include "render/soft_light.h"
 
 namespace vitrine {
@@ -20,6 +20,8 @@ struct SoftSums {
 
     /// @param finds_soft whether the path was asked for it
     void add(const PathResult& path, bool finds_soft);
+    /// @param distance of what sends soft light; 0: nothing was met
+    void add_hit(float distance);
     /// For `average_soft_light`; the variance is that per variance of one path.
     SoftPixel mean() const;
 };
@@ -59,11 +61,10 @@ class PixelSampler {
   private:
     void add(const PathPair& pair, const PathWish& wish, PixelSums& sums) const;
 
-    const RenderScene& scene_;
     std::vector<PathTracer> tracers_;
     CameraRays rays_;
-    Vec3f origin_;
     std::uint64_t seed_;
+    mutable Pool<PathGroup> groups_;
 };
 
 }  // namespace vitrine

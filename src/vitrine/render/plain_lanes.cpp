@@ -19,6 +19,12 @@ inline float interpolated(float a, float b, float c, float wa, float wb, float w
 /// Not infinite, not NaN.
 inline bool is_finite(float x) { return std::abs(x) <= std::numeric_limits<float>::max(); }
 
+inline bool is_any_rounded(const PlainLanes& lanes, int n) {
+    std::uint32_t any = 0;
+    for (int i = 0; i < n; ++i) any |= lanes.is_rounded[i];
+    return any != 0;
+}
+
 inline float unit_float(std::uint32_t bits) {
     return static_cast<float>(static_cast<std::int32_t>(bits >> 8)) * 0x1p-24f;
 }
@@ -57,6 +63,13 @@ VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
         lanes.geometric.x[i] = side[i] * fx;
         lanes.geometric.y[i] = side[i] * fy;
         lanes.geometric.z[i] = side[i] * fz;
+    }
+    if (!is_any_rounded(lanes, n)) {
+        lanes.shading = lanes.geometric;
+        return;
+    }
+    for (int i = 0; i < n; ++i) {
+        const float fx = lanes.facet.x[i], fy = lanes.facet.y[i], fz = lanes.facet.z[i];
         const float wb = lanes.weight1[i], wc = lanes.weight2[i];
         const float wa = 1.0f - wb - wc;
         const auto& [a, b, c] = lanes.corner_normal;
@@ -79,6 +92,15 @@ VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
 VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
     const int n = whole_steps(count);
     const Lane<float>& side = lanes.side;
+    if (!is_any_rounded(lanes, n)) {
+        lanes.smooth = lanes.position;
+        for (int i = 0; i < n; ++i) {
+            lanes.origin.x[i] = lanes.position.x[i] + epsilon * lanes.geometric.x[i];
+            lanes.origin.y[i] = lanes.position.y[i] + epsilon * lanes.geometric.y[i];
+            lanes.origin.z[i] = lanes.position.z[i] + epsilon * lanes.geometric.z[i];
+        }
+        return;
+    }
     for (int i = 0; i < n; ++i) {
         const float px = lanes.position.x[i], py = lanes.position.y[i], pz = lanes.position.z[i];
         const float w[3] = {1.0f - lanes.weight1[i] - lanes.weight2[i], lanes.weight1[i],

@@ -63,7 +63,9 @@ struct PlainLanes {
     // The path.
     Lanes3 throughput;
     RandomLanes random;
-    Lane<std::uint32_t> can_scatter;  ///< else shadow rays alone find the lamps
+    Lane<std::uint32_t> is_seen;        ///< from the camera, not by way of another receiver
+    Lane<std::uint32_t> light_samples;  ///< shadow rays to each lamp with size
+    Lane<std::uint32_t> can_scatter;    ///< else shadow rays alone find the lamps
     // A light's sample, then what it brings if nothing is in its way.
     Lane<float> u, v;
     Lanes3 to_light, light;

@@ -34,12 +34,12 @@ PathSampler sampler_of(int i) { return {stream_key(5, unsigned(i)), unsigned(3 *
 
 /// Hits of rays from all around, some from within.
 struct Points {
-    RenderScene scene{scene_of_two()};
+    RenderScene scene;
     std::vector<Hit> hits;
     std::vector<Vec3f> directions;
     PlainLanes lanes = {};
 
-    Points() {
+    explicit Points(const Scene& of = scene_of_two()) : scene(of) {
         Rng random(3);
         while (hits.size() < kCount) {
             const Vec3f outside(random.next_float() - 0.5f, random.next_float() - 0.5f,
@@ -89,6 +89,33 @@ TEST(PlainLanes, SurfacesAreThoseOfTheScene) {
     EXPECT_GT(inner, 3);
     EXPECT_GT(rounded, 10);
     EXPECT_LT(rounded, kCount - 10);
+}
+
+TEST(PlainLanes, FlatSurfacesAreThoseOfTheSceneAlsoAmongThemselves) {
+    Scene scene = scene_of_two();
+    for (Part& part : scene.parts) {
+        Mesh flat = *part.mesh;
+        flat.normals.clear();
+        part.mesh = std::make_shared<Mesh>(std::move(flat));
+    }
+    const Points points(scene);
+    for (int i = 0; i < kCount; ++i) {
+        const ShadingPoint point = points.point(i);
+        EXPECT_EQ(points.lanes.position.at(i), point.position);
+        EXPECT_EQ(points.lanes.shading.at(i), point.shading_normal);
+        EXPECT_EQ(points.lanes.smooth.at(i), point.smooth_position);
+        EXPECT_EQ(points.lanes.origin.at(i), points.scene.leave_smooth(point));
+    }
+}
+
+TEST(PlainLanes, NormalsOfTheFacetsRoundNothing) {
+    Scene scene = scene_of_two();
+    scene.parts[1].mesh =
+        std::make_shared<Mesh>(make_box(Vec3(0.1, 0.1, 0.1), Vec3(0.15, 0, 0.05)));
+    ASSERT_FALSE(scene.parts[1].mesh->normals.empty());
+    const RenderScene ready(scene);
+    EXPECT_TRUE(ready.shape(0).normals);
+    EXPECT_FALSE(ready.shape(1).normals);
 }
 
 TEST(PlainLanes, RandomPairsAreThoseOfTheSampler) {

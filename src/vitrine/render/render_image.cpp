@@ -60,6 +60,9 @@ namespace {
 /// A pixel darker than this share of the picture's mean need not be known better than that is.
 constexpr double kDarkShare = 0.1;
 
+/// Rows that a thread takes at once.
+constexpr std::size_t kRows = 2;
+
 /// Fewer paths in a pass would say nothing of their spread.
 constexpr int kMinPassSamples = 4;
 
@@ -69,16 +72,19 @@ struct PixelSum {
     double square = 0;  // of the luminance
     int count = 0;
 
-    void add(const Rgb& value) {
-        sum += value.cast<double>();
-        square += static_cast<double>(luminance(value)) * luminance(value);
+    void add(const PathResult& path) {
         ++count;
+        if (path.is_dark()) return;
+        const Rgb value = path.sharp();
+        const double level = luminance(value);
+        sum += value.cast<double>();
+        square += level * level;
     }
     Rgbd mean() const { return sum / count; }
     /// Of the mean's luminance.
-    double variance() const {
+    double variance(const Rgbd& its_mean) const {
         if (count < 2) return 0;
-        const double l = luminance(mean());
+        const double l = luminance(its_mean);
         return std::max(0.0, square / count - l * l) / (count - 1);
     }
 };
@@ -100,21 +106,6 @@ struct PictureSums {
     Image<SoftSum> soft;  // empty where it is
 };
 
-/// Calls `body(begin, end)` for a few rows at a time, in bands with a progress report after each.
-template <typename Body>
-void for_all_rows(const Camera& camera, const Progress& progress, const Body& body) {
-    constexpr int kBand = 32;
-    constexpr std::size_t kRows = 2;
-    for (int band = 0; band < camera.height; band += kBand) {
-        const int rows = std::min(kBand, camera.height - band);
-        parallel_for_blocks(static_cast<std::size_t>(rows), kRows,
-                            [&](std::size_t begin, std::size_t end) {
-                                body(band + static_cast<int>(begin), band + static_cast<int>(end));
-                            });
-        progress.update(static_cast<double>(band + rows) / camera.height, "render");
-    }
-}
-
 /// Paths each pixel should get in every pass, after what the first ones showed.
 Image<int> plan_pass(const Image<PixelSum>& sums, const FinalOptions& options, int pass_count) {
     double mean = 0;
@@ -122,9 +113,10 @@ Image<int> plan_pass(const Image<PixelSum>& sums, const FinalOptions& options, i
     ImageF variance(sums.width(), sums.height()), target(sums.width(), sums.height());
     Image<int> count(sums.width(), sums.height());
     for (std::size_t i = 0; i < sums.size(); ++i) {
-        const double level = std::hypot(luminance(sums[i].mean()), kDarkShare * mean);
+        const Rgbd pixel_mean = sums[i].mean();
+        const double level = std::hypot(luminance(pixel_mean), kDarkShare * mean);
         const double error = std::max(1e-12, options.noise_target * level);
-        variance[i] = static_cast<float>(sums[i].variance());
+        variance[i] = static_cast<float>(sums[i].variance(pixel_mean));
         target[i] = static_cast<float>(error * error * pass_count);
         count[i] = sums[i].count;
     }
@@ -137,7 +129,6 @@ class ImageSampler {
                  const TranslucentLight& translucent, const FinalOptions& options)
         : tracer_(scene, caustics, path_options(options), &translucent),
           rays_(camera),
-          origin_(camera.centre_in_world().cast<float>()),
           seed_(options.seed) {}
 
     /// Brings the pixels of some rows to `target(x, y)` samples, and those with soft light, where
@@ -145,28 +136,25 @@ class ImageSampler {
     template <typename Target, typename SoftTarget>
     void add_samples(int begin_row, int end_row, const Target& target,
                      const SoftTarget& soft_target, PictureSums& sums) const {
-        int y = begin_row;
-        PathGroup group(std::span(&tracer_, 1), rays_, origin_, y,
-                        [&](int x, const PathWish& wish, const PathPair& pair) {
-                            sums.pixels(x, y).add(pair.with().sharp());
-                            if (!sums.is_soft_apart) return;
-                            SoftSum& soft = sums.soft(x, y);
-                            soft.sums.add(pair.with(), wish.finds_soft);
-                            soft.count += wish.finds_soft ? 1 : 0;
-                        });
-        for (; y < end_row; ++y) {
-            group.begin_row(y);
+        const auto group = groups_.lend(
+            [&] { return std::make_unique<PathGroup>(std::span(&tracer_, 1), rays_); });
+        for (int y = begin_row; y < end_row; ++y) {
+            const auto use = [&](int x, const PathWish& wish, const PathPair& pair) {
+                sums.pixels(x, y).add(pair.with());
+                if (!sums.is_soft_apart) return;
+                SoftSum& soft = sums.soft(x, y);
+                soft.sums.add(pair.with(), wish.finds_soft);
+                soft.count += wish.finds_soft ? 1 : 0;
+            };
+            PathRow row(*group, y, use);
             for (int x = 0; x < sums.pixels.width(); ++x) {
                 const int begin = sums.pixels(x, y).count, end = target(x, y);
                 const PathSampler sampler(stream_key(seed_, unsigned(x), unsigned(y)), 0);
-                int soft_left = end - begin;
-                if (sums.is_soft_apart) soft_left = soft_target(x, y) - sums.soft(x, y).count;
-                for (int k = begin; k < end; ++k) {
-                    group.add(0, x, sampler.at(static_cast<std::uint32_t>(k)),
-                              {soft_left-- > 0, 1});
-                }
+                int soft_count = end - begin;
+                if (sums.is_soft_apart) soft_count = soft_target(x, y) - sums.soft(x, y).count;
+                row.add(x, sampler, begin, end, soft_count);
             }
-            group.finish();
+            row.finish();
         }
     }
 
@@ -179,8 +167,8 @@ class ImageSampler {
 
     PathTracer tracer_;
     CameraRays rays_;
-    Vec3f origin_;
     std::uint64_t seed_;
+    mutable Pool<PathGroup> groups_;
 };
 
 /// Adds the soft light of each pixel's surface with that of its neighbours.
@@ -228,11 +216,13 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         }
         const ImageSampler sampler(scene, maps, camera, translucent, options);
         const auto run = [&](double from, double to) {
-            for_all_rows(
-                camera, progress.part(start + from * share, start + to * share),
-                [&](int begin_row, int end_row) {
+            parallel_for_blocks(
+                static_cast<std::size_t>(camera.height), kRows,
+                progress.part(start + from * share, start + to * share), "render",
+                [&](std::size_t begin_row, std::size_t end_row) {
                     sampler.add_samples(
-                        begin_row, end_row, [&](int x, int y) { return plan(x, y) * (pass + 1); },
+                        static_cast<int>(begin_row), static_cast<int>(end_row),
+                        [&](int x, int y) { return plan(x, y) * (pass + 1); },
                         [&](int x, int y) { return soft_share(soft_per_pass * (pass + 1), x, y); },
                         sums);
                 });
@@ -245,10 +235,11 @@ RenderedImage render_passes(const RenderScene& scene, const Camera& camera,
         }
     }
     RenderedImage image{ImageRgb(camera.width, camera.height), ImageF(camera.width, camera.height)};
-    for (std::size_t i = 0; i < sums.pixels.size(); ++i) {
-        image.radiance[i] = sums.pixels[i].mean().cast<float>();
-        image.variance[i] = static_cast<float>(sums.pixels[i].variance());
-    }
+    parallel_for(sums.pixels.size(), 4096, [&](std::size_t i) {
+        const Rgbd mean = sums.pixels[i].mean();
+        image.radiance[i] = mean.cast<float>();
+        image.variance[i] = static_cast<float>(sums.pixels[i].variance(mean));
+    });
     if (is_averaged) add_soft(sums, camera, image.radiance);
     return image;
 }

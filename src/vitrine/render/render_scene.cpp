@@ -120,6 +120,24 @@ RenderScene::RenderScene(const RenderScene& world, std::vector<Part> virtual_par
     measure_parts();
 }
 
+namespace {
+
+/// Whether normals per vertex say anything else than the facets do.
+bool is_rounded(const Mesh& mesh) {
+    constexpr float kSquare = 1e-11f;  // of what rounding to float does to a unit vector
+    if (mesh.normals.empty()) return false;
+    for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+        const Vec3f facet = triangle_normal(mesh, t);
+        for (const int v : mesh.triangles[t]) {
+            const Vec3f normal = mesh.normals[static_cast<std::size_t>(v)].normalized();
+            if (!((normal - facet).squaredNorm() < kSquare)) return true;
+        }
+    }
+    return false;
+}
+
+}  // namespace
+
 void RenderScene::measure_parts() {
     VITRINE_CHECK_LT(scene_.parts.size(), std::size_t{1} << 15);  // as numbered by `Media`
     const Box3 box = bounds(scene_);
@@ -134,10 +152,12 @@ void RenderScene::measure_parts() {
         const bool is_textured = diffuse && diffuse->albedo_texture && !mesh.uv.empty();
         const bool is_painted = diffuse && diffuse->use_vertex_colours && !mesh.colours.empty();
         shapes_.push_back({mesh.triangles.data(), mesh.vertices.data(),
-                           mesh.normals.empty() ? nullptr : mesh.normals.data(),
+                           is_rounded(mesh) ? mesh.normals.data() : nullptr,
                            mesh.colours.empty() ? nullptr : mesh.colours.data(), diffuse != nullptr,
+                           std::holds_alternative<Dielectric>(part.material),
                            !is_textured && !is_painted,
                            diffuse ? diffuse->albedo : Rgb(Rgb::Zero())});
+        triangle_count_ += mesh.triangles.size();
         const auto* translucent = std::get_if<Translucent>(&part.material);
         const bool is_body = translucent && !part.mesh->empty();
         bodies_.push_back(is_body ? std::make_shared<TranslucentBody>(part.mesh, *translucent)
@@ -173,12 +193,12 @@ void RenderScene::closest(std::span<const Ray> rays, std::span<Hit> hits) const 
     }
 }
 
-void RenderScene::add_closest(std::span<RayAndHit> rays, bool are_alike) const {
+void RenderScene::add_closest(const RayList& rays, bool are_alike) const {
     std::vector<std::int32_t> met;
     met.reserve(rays.size());
-    for (RayAndHit& ray : rays) {
-        met.push_back(ray.part);
-        ray.part = -1;
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        met.push_back(rays[i].part);
+        rays[i].part = -1;
     }
     added_accel_.closest(rays, are_alike);
     const auto first = static_cast<std::int32_t>(accel_.parts().size());
@@ -217,9 +237,10 @@ ShadingPoint RenderScene::surface(const Hit& hit, const Vec3f& ray_direction) co
     point.is_front = hit.normal.dot(ray_direction) <= 0;
     const float side = point.is_front ? 1.0f : -1.0f;
     point.geometric_normal = side * hit.normal;
-    point.shading_normal = side * shading_normal(mesh, hit);
+    const bool is_flat = !shape(hit.part).normals;
+    point.shading_normal = is_flat ? point.geometric_normal : side * shading_normal(mesh, hit);
     point.smooth_position = point.position;
-    if (!mesh.normals.empty() && !dielectric(hit.part)) {
+    if (!is_flat && !dielectric(hit.part)) {
         // Hanika 2021, "Hacking the shadow terminator": the point seen from the tangent planes of
         // the vertices, lifted where these lie above it.
         const Triangle& t = mesh.triangles[static_cast<std::size_t>(hit.triangle)];

@@ -53,10 +53,11 @@ struct ShadingPoint {
 struct PartShape {
     const Triangle* triangles;
     const Vec3f* vertices;
-    const Vec3f* normals;  ///< null: flat
+    const Vec3f* normals;  ///< null: flat, or with normals that are those of its facets
     const Rgb* colours;    ///< null: none
     bool is_diffuse;       ///< a plain diffuse surface, of `Material` Diffuse
-    bool has_one_albedo;   ///< of these: `albedo` everywhere
+    bool is_dielectric;
+    bool has_one_albedo;  ///< of these: `albedo` everywhere
     Rgb albedo;
 };
 
@@ -88,7 +89,7 @@ class RenderScene {
     }
     /// Of many rays; see `Accel::closest`.
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
-    void closest(std::span<RayAndHit> rays, bool are_alike) const {
+    void closest(const RayList& rays, bool are_alike) const {
         accel_.closest(rays, are_alike);
         if (!added_accel_.empty()) add_closest(rays, are_alike);
     }
@@ -133,6 +134,8 @@ class RenderScene {
     /// exp(-sigma_a distance) of the medium a path is in.
     Rgb transmittance(const Media& media, float distance) const;
 
+    /// More than the caches near a core hold: surfaces to be met are better asked for ahead.
+    bool is_large() const { return triangle_count_ > 50'000; }
     /// Asks memory for what `surface` and `bsdf` will read; the second needs what the first asks
     /// for.
     /// @param hit a Hit or a RayAndHit
@@ -173,7 +176,7 @@ class RenderScene {
   private:
     void measure_parts();
     /// What rays meet of the parts added later, if it is nearer than what they have met.
-    void add_closest(std::span<RayAndHit> rays, bool are_alike) const;
+    void add_closest(const RayList& rays, bool are_alike) const;
 
     Scene scene_;
     Accel accel_;
@@ -183,6 +186,7 @@ class RenderScene {
     std::vector<double> volumes_m3_;
     std::vector<int> medium_rank_;
     std::vector<PartShape> shapes_;
+    std::size_t triangle_count_ = 0;
     std::vector<std::shared_ptr<const TranslucentBody>> bodies_;  // per part
     float epsilon_ = 1e-6f;
 };

@@ -39,7 +39,7 @@ class BodyGatherer {
             std::vector<PathTask> tasks;
             const std::uint64_t stream = stream_key(options_.seed, 0x7a15u, unsigned(part_), i);
             for (int s = 0; s < options_.paths_per_sample; ++s) {
-                tasks.push_back({{PathSampler(stream, std::uint32_t(s)), Vec3f::Zero()}, {}});
+                tasks.push_back({PathSampler(stream, std::uint32_t(s)), {}});
             }
             std::vector<PathPair> pairs(tasks.size());
             tracer.entering(point, eta_, tasks, free, pairs);

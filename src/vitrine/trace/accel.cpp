@@ -142,22 +142,24 @@ void Accel::closest(std::span<const Ray> rays, std::span<Hit> hits) const {
     for (std::size_t begin = 0; begin < rays.size(); begin += kStream) {
         const std::size_t count = std::min(kStream, rays.size() - begin);
         for (std::size_t i = 0; i < count; ++i) stream[i] = start_of(rays[begin + i]);
-        closest(std::span(stream).first(count), true);
+        closest(RayList(std::span(stream).first(count)), true);
         for (std::size_t i = 0; i < count; ++i) hits[begin + i] = hit_of(stream[i]);
     }
 }
 
-void Accel::closest(std::span<RayAndHit> rays, bool are_alike) const {
-    if (!impl_ || rays.empty()) return;
+void Accel::closest(const RayList& rays, bool are_alike) const {
+    if (!impl_ || rays.size() == 0) return;
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     if (are_alike) {
         context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
         rtcIntersect1M(impl_->scene, &context, to_embree(rays.data()),
-                       static_cast<unsigned>(rays.size()), sizeof(RayAndHit));
+                       static_cast<unsigned>(rays.size()), rays.stride_bytes());
         return;
     }
-    for (RayAndHit& ray : rays) rtcIntersect1(impl_->scene, &context, to_embree(&ray));
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+        rtcIntersect1(impl_->scene, &context, to_embree(&rays[i]));
+    }
 }
 
 bool Accel::is_occluded(const Ray& ray) const {

@@ -61,7 +61,7 @@ class Accel {
     void closest(std::span<const Ray> rays, std::span<Hit> hits) const;
     /// Answers each ray in place.
     /// @param are_alike neighbours are traced together; else one by one
-    void closest(std::span<RayAndHit> rays, bool are_alike) const;
+    void closest(const RayList& rays, bool are_alike) const;
     bool is_occluded(const Ray& ray) const;
     /// Answers each ray in place: in two thirds of the time or less, alike or not.
     void occluded(std::span<BareRay> rays) const;

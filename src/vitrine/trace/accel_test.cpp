@@ -67,7 +67,7 @@ TEST(Accel, ListsAreAnsweredAsSingleRays) {
     for (const bool are_alike : {false, true}) {
         std::vector<RayAndHit> list;
         for (const Ray& ray : rays) list.emplace_back(ray.origin, ray.direction, ray.mask);
-        accel.closest(list, are_alike);
+        accel.closest(std::span(list), are_alike);
         for (std::size_t i = 0; i < rays.size(); ++i) {
             const Hit alone =
                 accel.closest({rays[i].origin, rays[i].direction, 0.0f, 1e30f, rays[i].mask});
@@ -82,6 +82,32 @@ TEST(Accel, ListsAreAnsweredAsSingleRays) {
         }
     }
     EXPECT_GT(hits, 200);
+}
+
+TEST(Accel, RaysOfItemsAreAnsweredInPlace) {
+    struct Item {
+        RayAndHit ray;
+        std::int64_t number[3];
+    };
+    const Accel accel = sphere_and_plane();
+    std::vector<RayAndHit> list;
+    std::vector<Item> items;
+    for (const Ray& ray : random_rays()) {
+        list.emplace_back(ray.origin, ray.direction, ray.mask);
+        items.push_back({list.back(), {7, 8, 9}});
+    }
+    for (const bool are_alike : {false, true}) {
+        for (std::size_t i = 0; i < items.size(); ++i) items[i].ray = list[i];
+        std::vector<RayAndHit> apart = list;
+        accel.closest(std::span(apart), are_alike);
+        accel.closest(RayList::of(std::span(items)), are_alike);
+        for (std::size_t i = 0; i < items.size(); ++i) {
+            ASSERT_EQ(items[i].ray.part, apart[i].part);
+            EXPECT_EQ(items[i].ray.distance(), apart[i].distance());
+            EXPECT_EQ(items[i].number[0] + items[i].number[1] + items[i].number[2], 24);
+        }
+    }
+    accel.closest(RayList::of(std::span<Item>()), true);
 }
 
 TEST(Accel, NearestPointOnSphereAndPlane) {

@@ -4,7 +4,9 @@
 
 #include "geometry/mesh.h"
 
+#include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace vitrine {
 
@@ -40,6 +42,31 @@ struct alignas(16) RayAndHit {
 
     bool is_hit() const { return part >= 0; }
     float distance() const { return ray.max_distance; }
+};
+
+/// Rays one after the other, or each at the beginning of an item that holds more.
+class RayList {
+  public:
+    RayList(std::span<RayAndHit> rays) : RayList(rays.data(), rays.size(), sizeof(RayAndHit)) {}
+    /// @param items with a `ray` at their beginning
+    template <typename Item>
+    static RayList of(std::span<Item> items) {
+        static_assert(offsetof(Item, ray) == 0);
+        return {items.empty() ? nullptr : &items.front().ray, items.size(), sizeof(Item)};
+    }
+    std::size_t size() const { return count_; }
+    std::size_t stride_bytes() const { return stride_bytes_; }
+    RayAndHit* data() const { return first_; }
+    RayAndHit& operator[](std::size_t i) const {
+        return *reinterpret_cast<RayAndHit*>(reinterpret_cast<std::byte*>(first_) +
+                                             i * stride_bytes_);
+    }
+
+  private:
+    RayList(RayAndHit* first, std::size_t count, std::size_t stride_bytes)
+        : first_(first), count_(count), stride_bytes_(stride_bytes) {}
+    RayAndHit* first_;
+    std::size_t count_, stride_bytes_;
 };
 
 }  // namespace vitrine
