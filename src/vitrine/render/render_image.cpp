@@ -139,8 +139,9 @@ class ImageSampler {
         const auto group = groups_.lend(
             [&] { return std::make_unique<PathGroup>(std::span(&tracer_, 1), rays_); });
         for (int y = begin_row; y < end_row; ++y) {
+            PixelSum* const pixels = &sums.pixels(0, y);
             const auto use = [&](int x, const PathWish& wish, const PathPair& pair) {
-                sums.pixels(x, y).add(pair.with());
+                pixels[x].add(pair.with());
                 if (!sums.is_soft_apart) return;
                 SoftSum& soft = sums.soft(x, y);
                 soft.sums.add(pair.with(), wish.finds_soft);
