@@ -8,6 +8,7 @@
 #include "render/path_tracer.h"
 #include "render/plain_lanes.h"
 
+#include <cstring>
 #include <vector>
 
 namespace vitrine {
@@ -40,6 +41,14 @@ void for_each_batch(std::span<const Item> all, const Body& body) {
 
 /// What a path knows of itself beside the ray it is on.
 struct PathTracer::State {
+    State() = default;
+    // As a whole, which is a few wide moves; member by member it is twenty narrow ones.
+    State(const State& other) { std::memcpy(static_cast<void*>(this), &other, sizeof(State)); }
+    State& operator=(const State& other) {
+        std::memcpy(static_cast<void*>(this), &other, sizeof(State));
+        return *this;
+    }
+
     Rgb throughput = Rgb::Ones();
     float pdf = 0;             // of the ray's direction at the receiver it left; 0: a single one
     std::uint32_t path = 0;    // whose task and result
