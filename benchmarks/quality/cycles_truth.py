@@ -125,14 +125,17 @@ def read_obj(path):
     return vertices, faces
 
 
-def add_lamp(light):
-    """The one-sided disc as the 64-gon that the truth has."""
+def add_lamp(light, is_sampled):
+    """The one-sided disc as the 64-gon that the truth has.
+
+    is_sampled: also by shadow rays; else only paths that happen on it bring its light."""
     centre, normal = Vector(light["centre"]), Vector(light["normal"]).normalized()
     side = normal.orthogonal().normalized()
     up = normal.cross(side)
     angles = [2 * math.pi * k / 64 for k in range(64)]
     ring = [centre + light["radius"] * (math.cos(a) * side + math.sin(a) * up) for a in angles]
     made = bpy.data.materials.new("lamp")
+    made.cycles.sample_as_light = is_sampled
     nodes = Nodes(made)
     radiance = np.array(light["radiance_W_m2_sr"])
     emission = nodes.add("Emission", Color=rgba(radiance / radiance.max()),
@@ -143,11 +146,11 @@ def add_lamp(light):
     add_mesh("lamp", ring, [list(range(64))], made)
 
 
-def make_scene(truth, folder):
+def make_scene(truth, folder, samples_lamps):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     scene = bpy.context.scene
     for light in truth["lights"]:
-        add_lamp(light)
+        add_lamp(light, samples_lamps)
     for item in truth["objects"]:
         vertices, faces = read_ply(os.path.join(folder, item["mesh"]))
         add_mesh(item["name"], vertices, faces, make_material(item["name"], item["material"], folder))
@@ -182,7 +185,7 @@ def set_window(render, window):
     render.border_max_y = 1 - (y - 0.01) / render.resolution_y
 
 
-def set_sampling(scene, samples, way):
+def set_sampling(scene, samples):
     scene.render.engine = "CYCLES"
     cycles = scene.cycles
     cycles.samples = samples
@@ -190,7 +193,6 @@ def set_sampling(scene, samples, way):
     cycles.sampling_pattern = "SOBOL"
     cycles.pixel_filter_type = "BOX"
     cycles.filter_width = 1.0
-    cycles.direct_light_sampling_type = way
     cycles.light_sampling_threshold = 0
     cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
     cycles.blur_glossy = 0
@@ -211,18 +213,18 @@ def main():
     parser.add_argument("--window", type=int, nargs=4, metavar=("X", "Y", "W", "H"))
     parser.add_argument("--samples", type=int, default=1024, help="paths a pixel and seed")
     parser.add_argument("--seeds", type=int, nargs="+", default=[0, 1])
-    parser.add_argument("--no-mis", action="store_true", help="find lamps by chance alone")
+    parser.add_argument("--by-chance", action="store_true",
+                        help="no shadow rays to the lamps: the same picture with far more noise")
     parser.add_argument("--out", required=True)
     options = parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
 
     folder = os.path.join(os.path.abspath(options.capture), "truth")
     with open(os.path.join(folder, "scene.json")) as file:
         truth = json.load(file)
-    scene = make_scene(truth, folder)
+    scene = make_scene(truth, folder, not options.by_chance)
     view = next(v for v in truth["views"] if v["index"] == options.frame)
     set_camera(scene, truth["camera"], view["camera_to_world"])
-    way = "FORWARD_PATH_TRACING" if options.no_mis else "MULTIPLE_IMPORTANCE_SAMPLING"
-    set_sampling(scene, options.samples, way)
+    set_sampling(scene, options.samples)
     if options.window:
         set_window(scene.render, options.window)
 
