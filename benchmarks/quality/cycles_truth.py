@@ -42,9 +42,6 @@ class Nodes:
                 socket.default_value = value
         return node
 
-    def output(self, kind, **inputs):
-        self.add(kind, **inputs)
-
 
 def rgba(colour):
     return (*colour, 1.0)
@@ -67,7 +64,7 @@ def make_material(name, material, folder):
     made = bpy.data.materials.new(name)
     nodes = Nodes(made)
     if material["type"] == "lambert":
-        nodes.output("OutputMaterial", Surface=lambert(nodes, material, folder))
+        nodes.add("OutputMaterial", Surface=lambert(nodes, material, folder))
     elif material["type"].startswith("smooth dielectric"):
         glass = nodes.add("BsdfGlass", Color=rgba([1, 1, 1]), IOR=material["ior"])
         glass.distribution = "SHARP"
@@ -77,7 +74,7 @@ def make_material(name, material, folder):
             absorption = nodes.add("VolumeAbsorption", Density=sigma.max(),
                                    Color=rgba(1 - sigma / sigma.max()))
             sockets["Volume"] = absorption.outputs[0]
-        nodes.output("OutputMaterial", **sockets)
+        nodes.add("OutputMaterial", **sockets)
     else:
         diffuse = nodes.add("BsdfDiffuse", Color=rgba(material["rho_d"]))
         glossy = nodes.add("BsdfGlossy", Color=rgba(material["rho_s"]),
@@ -86,7 +83,7 @@ def make_material(name, material, folder):
         both = nodes.add("AddShader")
         nodes.tree.links.new(diffuse.outputs[0], both.inputs[0])
         nodes.tree.links.new(glossy.outputs[0], both.inputs[1])
-        nodes.output("OutputMaterial", Surface=both.outputs[0])
+        nodes.add("OutputMaterial", Surface=both.outputs[0])
     return made
 
 
@@ -142,7 +139,7 @@ def add_lamp(light, is_sampled):
                          Strength=radiance.max())
     sides = nodes.add("MixShader", Fac=nodes.add("NewGeometry").outputs["Backfacing"])
     nodes.tree.links.new(emission.outputs[0], sides.inputs[1])
-    nodes.output("OutputMaterial", Surface=sides.outputs[0])
+    nodes.add("OutputMaterial", Surface=sides.outputs[0])
     add_mesh("lamp", ring, [list(range(64))], made)
 
 
@@ -157,7 +154,7 @@ def make_scene(truth, folder, samples_lamps):
     scene.world = bpy.data.worlds.new("ambient")
     nodes = Nodes(scene.world)
     background = nodes.add("Background", Color=rgba([truth["ambient"]["radiance_W_m2_sr"]] * 3))
-    nodes.output("OutputWorld", Surface=background.outputs[0])
+    nodes.add("OutputWorld", Surface=background.outputs[0])
     return scene
 
 

@@ -265,15 +265,13 @@ void compare_insertion(const RenderQualityOptions& options, const TruthScene& tr
                 paths = change_by_paths(truth, part, camera, options.path_samples, window, image,
                                         frame, top);
                 if (!options.rerendered.empty()) {
-                    compare_rerendered(options.rerendered, frame, "paths",
-                                       read_virtual_mask(folder, camera), *paths, nullptr, top);
+                    compare_rerendered(options.rerendered, frame, "paths", *paths, nullptr, top);
                 }
             }
             print_shares(frame, d_render, *d_second, paths ? &*paths : nullptr, in_window);
         }
         if (!options.rerendered.empty()) {
-            compare_rerendered(options.rerendered, frame, "ours", read_virtual_mask(folder, camera),
-                               d_render, other, top);
+            compare_rerendered(options.rerendered, frame, "ours", d_render, other, top);
         }
         if (std::holds_alternative<Dielectric>(part.material)) {
             print_glints(frame, renderer.scene(), image, d_render, noise_variance, top);

@@ -73,6 +73,7 @@ TrueFrame make_frame(const Camera& camera, const ImageRgb& plate, const ImageRgb
     frame.camera = camera;
     frame.plate = plate;
     frame.with = with;
+    frame.virtual_mask = virtual_mask;
     frame.raw_true = raw_difference(frame.with, frame.plate, top);
     frame.d_true = gaussian_blur(frame.raw_true, kBlurPx);
     for (const Rgb& p : frame.plate) frame.level += clipped(p, top).mean();
@@ -88,14 +89,10 @@ TrueFrame make_frame(const Camera& camera, const ImageRgb& plate, const ImageRgb
     return frame;
 }
 
-Mask read_virtual_mask(const fs::path& folder, const Camera& camera) {
-    return read_mask(folder / (camera.id + "_virtual_mask.png"));
-}
-
 TrueFrame read_frame(const fs::path& folder, const Camera& camera, float top) {
     return make_frame(camera, read_exr_rgb(folder / ".." / "linear" / (camera.id + ".exr")),
                       read_exr_rgb(folder / (camera.id + "_with.exr")),
-                      read_virtual_mask(folder, camera), top);
+                      read_mask(folder / (camera.id + "_virtual_mask.png")), top);
 }
 
 }  // namespace vitrine

@@ -43,16 +43,15 @@ struct TrueFrame {
     ImageRgb plate, with;  // of the truth
     ImageRgb raw_true, d_true;
     double level = 0;
-    Mask regions[4];  // see kRegionNames
+    Mask virtual_mask;  // pixels that show the virtual object
+    Mask regions[4];    // see kRegionNames
 };
 inline constexpr const char* kRegionNames[4] = {"object", "darker", "brighter", "all"};
 
-/// @param virtual_mask pixels that show the virtual object
 TrueFrame make_frame(const Camera& camera, const ImageRgb& plate, const ImageRgb& with,
                      const Mask& virtual_mask, float top);
 
 /// @param folder of the insertion's truth
-Mask read_virtual_mask(const std::filesystem::path& folder, const Camera& camera);
 TrueFrame read_frame(const std::filesystem::path& folder, const Camera& camera, float top);
 
 }  // namespace vitrine

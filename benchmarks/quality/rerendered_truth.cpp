@@ -85,13 +85,13 @@ std::optional<RerenderedPicture> read_rerendered(const fs::path& folder, const s
 }
 
 void compare_rerendered(const fs::path& folder, const TrueFrame& given, const char* name,
-                        const Mask& virtual_mask, const ImageRgb& ours, const ImageRgb* second,
-                        float top) {
+                        const ImageRgb& ours, const ImageRgb* second, float top) {
     const std::string& id = given.camera.id;
     const auto plate = read_rerendered(folder, id, given.plate);
     const auto with = read_rerendered(folder, id + "_with", given.with);
     if (!plate || !with) return;
-    const TrueFrame again = make_frame(given.camera, plate->mean, with->mean, virtual_mask, top);
+    const TrueFrame again =
+        make_frame(given.camera, plate->mean, with->mean, given.virtual_mask, top);
     const auto half = [&](const ImageRgb& a, const ImageRgb& b) {
         return gaussian_blur(raw_difference(a, b, top), kBlurPx);
     };

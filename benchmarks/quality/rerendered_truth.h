@@ -30,7 +30,6 @@ std::optional<RerenderedPicture> read_rerendered(const std::filesystem::path& fo
 /// @param ours blurred change
 /// @param second with other random numbers; null: our noise is not known
 void compare_rerendered(const std::filesystem::path& folder, const TrueFrame& given,
-                        const char* name, const Mask& virtual_mask, const ImageRgb& ours,
-                        const ImageRgb* second, float top);
+                        const char* name, const ImageRgb& ours, const ImageRgb* second, float top);
 
 }  // namespace vitrine

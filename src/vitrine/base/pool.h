@@ -22,7 +22,6 @@ class Pool {
             if (item_) pool_.give_back(std::move(item_));
         }
         T& operator*() const { return *item_; }
-        T* operator->() const { return item_.get(); }
 
       private:
         Pool& pool_;

@@ -40,13 +40,11 @@ class Batch {
     }
     std::size_t size() const { return size_; }
     T& operator[](std::size_t i) { return items_[i]; }
-    const T& operator[](std::size_t i) const { return items_[i]; }
     T* begin() { return items_.data(); }
     T* end() { return items_.data() + size_; }
     const T* begin() const { return items_.data(); }
     const T* end() const { return items_.data() + size_; }
     std::span<T> items() { return {begin(), size_}; }
-    std::span<const T> items() const { return {begin(), size_}; }
 
   private:
     std::vector<T> items_;  // those from `size_` on are waste

@@ -9,12 +9,6 @@ constexpr float kMinSplitShare = 0.01f;
 
 }  // namespace
 
-void PathTracer::pass_glass(Wave& wave) const {
-    for_each_batch<Flight*>(wave.glass.items(),
-                            [&](std::span<Flight* const> hits) { pass_glass(wave, hits); });
-    wave.glass.clear();
-}
-
 void PathTracer::pass_glass(Wave& wave, std::span<Flight* const> hits) const {
     PlainLanes& lanes = wave.lanes;
     GlassLanes& bent = wave.bent;

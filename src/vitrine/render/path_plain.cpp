@@ -37,12 +37,6 @@ std::vector<std::optional<LaneLight>> lane_lights(const LightSampler& lights) {
     return result;
 }
 
-void PathTracer::shade_plain(Wave& wave) const {
-    for_each_batch<Flight*>(wave.plain.items(),
-                            [&](std::span<Flight* const> hits) { shade_plain(wave, hits); });
-    wave.plain.clear();
-}
-
 void PathTracer::shade_plain(Wave& wave, std::span<Flight* const> hits) const {
     PlainLanes& lanes = wave.lanes;
     const int count = static_cast<int>(hits.size());

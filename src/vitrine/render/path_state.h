@@ -31,14 +31,6 @@ std::size_t lane(T i) {
     return static_cast<std::size_t>(i);
 }
 
-/// Calls `body(items)` for as many at a time as there are lanes.
-template <typename Item, typename Body>
-void for_each_batch(std::span<const Item> all, const Body& body) {
-    for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
-        body(all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
-    }
-}
-
 /// What a path knows of itself beside the ray it is on.
 struct PathTracer::State {
     State() = default;
@@ -172,8 +164,8 @@ struct PathTracer::Wave {
     Sink sink(const State& state) const { return {results[state.path]}; }
     /// The path's random numbers at its vertex, into a lane.
     void set_random(int i, const State& state);
-    /// Room for all that `count` paths under way may meet and for where they may go on: surfaces
-    /// met point into it.
+    /// Forgets what was met. Room for all that `count` paths under way may meet and for where they
+    /// may go on: surfaces met point into it.
     void make_room(std::size_t count, bool may_part);
     /// Room for more shadow rays.
     void make_shadow_room(std::size_t count);
@@ -226,6 +218,8 @@ inline void PathTracer::Wave::set_random(int i, const State& state) {
 
 inline void PathTracer::Wave::make_room(std::size_t count, bool may_part) {
     parted.clear();
+    plain.clear();
+    glass.clear();
     parted.make_room(may_part ? count : 0);
     const std::size_t most = may_part ? 2 * count : count;
     plain.make_room(most);

@@ -32,20 +32,21 @@ PathTracer::PathTracer(const RenderScene& scene, const CausticMaps* caustics, Pa
 
 PathResult PathTracer::trace(const Vec3f& origin, const Vec3f& direction,
                              const PathTask& task) const {
-    PathPair pair;
-    Wave wave(scene_, std::span(&task, 1), std::span(&pair, 1));
-    wave.flights.make_room(1);
-    wave.flights.add(origin, direction, kAllParts, State());
-    start(kVirtualParts, wave);
-    return pair.with_;
+    return trace_one(origin, direction, task, kVirtualParts).with_;
 }
 
 PathPair PathTracer::trace_both(const Vec3f& origin, const Vec3f& direction,
                                 const PathTask& task) const {
+    return trace_one(origin, direction, task, all_views());
+}
+
+PathPair PathTracer::trace_one(const Vec3f& origin, const Vec3f& direction, const PathTask& task,
+                               std::uint32_t views) const {
     PathPair pair;
-    Workspace workspace(*this);
-    workspace.start(1)[0] = RayAndHit(origin, direction, kAllParts);
-    trace_both(std::span(&task, 1), std::span(&pair, 1), workspace);
+    Wave wave(scene_, std::span(&task, 1), std::span(&pair, 1));
+    wave.flights.make_room(1);
+    wave.flights.add(origin, direction, kAllParts, State());
+    start(views, wave);
     return pair;
 }
 
@@ -64,7 +65,7 @@ void PathTracer::trace_both(std::span<const PathTask> tasks, std::span<PathPair>
     Wave& wave = *workspace.wave_;
     wave.tasks = tasks;
     wave.results = results;
-    start(has_virtual_ ? kAllParts : kVirtualParts, wave);
+    start(all_views(), wave);
 }
 
 void PathTracer::start(std::uint32_t views, Wave& wave) const {
@@ -88,8 +89,8 @@ void PathTracer::finish(Wave& wave, bool are_alike) const {
         for (Flight& flight : wave.flights) {
             if (flight.ray.is_hit() || has_lamps_ || has_background_) meet(flight, wave);
         }
-        shade_plain(wave);
-        pass_glass(wave);
+        by_lanes(wave.plain.items(), [&](std::span<Flight*> hits) { shade_plain(wave, hits); });
+        by_lanes(wave.glass.items(), [&](std::span<Flight*> hits) { pass_glass(wave, hits); });
         add_shadows(wave);
         wave.go_on();
     }
@@ -147,7 +148,8 @@ void PathTracer::entering(const ShadingPoint& point, float eta, std::span<const 
     finish(wave, false);
 }
 
-void PathTracer::step(Flight& flight, Wave& wave) const {
+// Once per ray that meets something: within the loop of `finish`.
+inline void PathTracer::step(Flight& flight, Wave& wave) const {
     auto& [ray, state] = flight;
     Sink sink = wave.sink(state);
     if (state.medium != 0 && wave.media.absorbs(state.medium)) {

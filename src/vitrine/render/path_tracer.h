@@ -176,6 +176,10 @@ class PathTracer {
     struct ShadowRay;
     struct Wave;
     struct Flight;
+    /// Scenes that paths from the camera are followed in.
+    std::uint32_t all_views() const { return has_virtual_ ? kAllParts : kVirtualParts; }
+    PathPair trace_one(const Vec3f& origin, const Vec3f& direction, const PathTask& task,
+                       std::uint32_t views) const;
     void start(std::uint32_t views, Wave& wave) const;
     /// Follows all paths of the wave to their ends.
     /// @param are_alike rays next to each other
@@ -193,13 +197,11 @@ class PathTracer {
     void scatter_alone(State& state, const RayAndHit& ray, Wave& wave) const;
     void pass_mirror(const State& state, const ShadingPoint& point, const RayAndHit& ray,
                      const Rgb& reflectance, Wave& wave) const;
-    /// Where paths go on from the glass that the wave has met.
-    void pass_glass(Wave& wave) const;
+    /// Where paths go on from glass that the wave has met, many side by side.
     void pass_glass(Wave& wave, std::span<Flight* const> hits) const;
     /// @param i lane of the surface; @param beyond medium there
     void branch(const State& state, int i, std::uint32_t beyond, Wave& wave) const;
-    /// What the plain diffuse surfaces bring that the wave has met, many side by side.
-    void shade_plain(Wave& wave) const;
+    /// What plain diffuse surfaces bring that the wave has met, many side by side.
     void shade_plain(Wave& wave, std::span<Flight* const> hits) const;
     void add_direct(Wave& wave, std::span<Flight* const> hits) const;
     /// Where soft light is apart: says what surfaces it is of.

@@ -21,14 +21,6 @@ void absorb(Flight& flight, const Rgb& factor, PhotonBalance& balance) {
     if (!flight.has_arrived) balance.absorbed += before - flight.power.sum();
 }
 
-/// Calls `use` for parts of at most kLanes of the list.
-template <typename Use>
-void by_lanes(std::span<const std::uint32_t> numbers, const Use& use) {
-    for (std::size_t i = 0; i < numbers.size(); i += kLanes) {
-        use(numbers.subspan(i, std::min<std::size_t>(kLanes, numbers.size() - i)));
-    }
-}
-
 }  // namespace
 
 PhotonTracer::PhotonTracer(const RenderScene& scene, const CausticOptions& options)
@@ -55,10 +47,10 @@ void PhotonTracer::trace(const PhotonTarget& target, std::uint32_t view, PhotonG
         sort_out(target, depth, group);
         group.next_.clear();
         group.faint_.clear();
-        by_lanes(group.glass_, [&](std::span<const std::uint32_t> numbers) {
+        by_lanes(std::span(group.glass_), [&](std::span<const std::uint32_t> numbers) {
             pass_glass(target, depth, view, numbers, group);
         });
-        by_lanes(group.plain_, [&](std::span<const std::uint32_t> numbers) {
+        by_lanes(std::span(group.plain_), [&](std::span<const std::uint32_t> numbers) {
             store_plain(view, numbers, group);
         });
         for (const std::uint32_t i : group.others_) {

@@ -92,16 +92,9 @@ VITRINE_WIDE void find_surfaces(PlainLanes& lanes, int count) {
 VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
     const int n = whole_steps(count);
     const Lane<float>& side = lanes.side;
-    if (!is_any_rounded(lanes, n)) {
-        lanes.smooth = lanes.position;
-        for (int i = 0; i < n; ++i) {
-            lanes.origin.x[i] = lanes.position.x[i] + epsilon * lanes.geometric.x[i];
-            lanes.origin.y[i] = lanes.position.y[i] + epsilon * lanes.geometric.y[i];
-            lanes.origin.z[i] = lanes.position.z[i] + epsilon * lanes.geometric.z[i];
-        }
-        return;
-    }
-    for (int i = 0; i < n; ++i) {
+    const int rounded = is_any_rounded(lanes, n) ? n : 0;
+    lanes.smooth = lanes.position;
+    for (int i = 0; i < rounded; ++i) {
         const float px = lanes.position.x[i], py = lanes.position.y[i], pz = lanes.position.z[i];
         const float w[3] = {1.0f - lanes.weight1[i] - lanes.weight2[i], lanes.weight1[i],
                             lanes.weight2[i]};
@@ -121,6 +114,8 @@ VITRINE_WIDE void find_origins(PlainLanes& lanes, float epsilon, int count) {
         lanes.smooth.x[i] = is_rounded ? x : px;
         lanes.smooth.y[i] = is_rounded ? y : py;
         lanes.smooth.z[i] = is_rounded ? z : pz;
+    }
+    for (int i = 0; i < n; ++i) {
         lanes.origin.x[i] = lanes.smooth.x[i] + epsilon * lanes.geometric.x[i];
         lanes.origin.y[i] = lanes.smooth.y[i] + epsilon * lanes.geometric.y[i];
         lanes.origin.z[i] = lanes.smooth.z[i] + epsilon * lanes.geometric.z[i];

@@ -6,9 +6,11 @@
 
 #include "render/render_scene.h"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 
 namespace vitrine {
 
@@ -18,6 +20,14 @@ constexpr int kLaneStep = 16;
 
 /// Lanes that loops over the first `count` run over.
 constexpr int whole_steps(int count) { return (count + kLaneStep - 1) / kLaneStep * kLaneStep; }
+
+/// Calls `use(items)` for as many of a list at a time as there are lanes.
+template <typename Item, typename Use>
+void by_lanes(std::span<Item> all, const Use& use) {
+    for (std::size_t begin = 0; begin < all.size(); begin += kLanes) {
+        use(all.subspan(begin, std::min<std::size_t>(kLanes, all.size() - begin)));
+    }
+}
 
 template <typename T>
 using Lane = std::array<T, kLanes>;
